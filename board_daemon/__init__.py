@@ -1,0 +1,1 @@
+"""One emulated board as a process."""

@@ -1,0 +1,51 @@
+"""One board as a process: from its arguments until a signal ends it."""
+
+from __future__ import annotations
+
+import signal
+from typing import TYPE_CHECKING
+
+from board_daemon.hosting import HostedBoard
+from reconros_zenoh.board.control import ControlServer, claim_name
+from reconros_zenoh.clock.virtual import succeed_once
+from reconros_zenoh.clock.wall import WallEnvironment, keep_time
+from reconros_zenoh.transport.memory import tune_malloc
+from reconros_zenoh.transport.zenoh import ZenohTransport
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from board_daemon.hosting import BoardOptions
+    from reconros_zenoh.board.profile import Profile
+    from reconros_zenoh.project.loader import Project
+    from reconros_zenoh.project.mapping_file import Mapping
+
+
+def run_board(
+    router: str,
+    profile: Profile,
+    project: Project,
+    mapping: Mapping,
+    options: BoardOptions,
+    on_ready: Callable[[], None],
+) -> None:
+    """Return after SIGINT or SIGTERM, with everything closed; `on_ready` is called once the board serves.
+
+    Raise TransportError without a router, UsageError when the name is taken.
+    """
+    keep_time()
+    tune_malloc()
+    environment = WallEnvironment()
+    stop = environment.event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: environment.post(succeed_once, stop))
+    with ZenohTransport.open(router) as transport:
+        claim_name(transport, options.name)
+        hosted = HostedBoard(environment, transport, profile, project, mapping, options)
+        control = ControlServer(hosted.board, hosted.executor)
+        try:
+            on_ready()
+            environment.run(until=stop)
+        finally:
+            control.close()
+            hosted.close()

@@ -1,0 +1,138 @@
+"""A value of a YAML file that knows its line, with the variables of Compose filled in."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+from ruamel.yaml import YAML
+from ruamel.yaml.error import MarkedYAMLError, YAMLError
+from ruamel.yaml.reader import ReaderError
+
+from reconros_zenoh.errors import FileError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from pathlib import Path
+
+_NAME = r"[A-Za-z_][A-Za-z0-9_]*"
+_VARIABLE = re.compile(
+    rf"\$(?:(?P<dollar>\$)|(?P<plain>{_NAME})"
+    rf"|\{{(?P<braced>{_NAME})(?:(?P<sign>:?-)(?P<default>[^${{}}]*))?\}}|(?P<wrong>))"
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Node:
+    """One value of a YAML file.
+
+    `name` is its path of keys (`services.router.command`), `line` counts from 1, and `environment` gives the
+    values of the variables.
+    """
+
+    value: Any
+    name: str
+    line: int
+    path: Path
+    environment: Mapping[str, str]
+
+    @classmethod
+    def read(cls, path: Path, environment: Mapping[str, str]) -> Node:
+        """Return the whole file; raise FileError when it cannot be read or is not YAML."""
+        try:
+            text = path.read_text(encoding="utf-8")
+        except (OSError, UnicodeDecodeError) as error:
+            raise FileError(
+                path, None, f"cannot be read ({error}).", "Give a readable Compose file."
+            ) from None
+        try:
+            value = YAML(typ="rt").load(text)
+        except ReaderError as error:
+            line = text.count("\n", 0, error.position) + 1
+            raise FileError(path, line, "has a character that YAML does not allow.", "Remove it.") from None
+        except MarkedYAMLError as error:
+            place = error.problem_mark.line + 1 if error.problem_mark else None
+            raise FileError(path, place, f"is not YAML: {error.problem}.", "Correct the syntax.") from None
+        except YAMLError as error:
+            raise FileError(path, None, f"is not YAML: {error}.", "Correct the syntax.") from None
+        return cls(value, "the file", 1, path, environment)
+
+    def error(self, problem: str, remedy: str) -> FileError:
+        """Return the error that names this value, to be raised."""
+        return FileError(self.path, self.line, f"{self.name} {problem}", remedy)
+
+    def mapping(self) -> dict[str, Node]:
+        """Return the values under their keys, in the order of the file."""
+        if not isinstance(self.value, dict):
+            raise self._wrong_type("a mapping (`key: value`)")
+        wrong = next((key for key in self.value if not isinstance(key, str)), None)
+        if wrong is not None:
+            raise self.error(f"has the key {wrong!r}, which is not a string.", "Put it in quotes.")
+        return {key: self._member(key, key) for key in self.value}
+
+    def sequence(self) -> list[Node]:
+        """Return the items of the list."""
+        if not isinstance(self.value, list):
+            raise self._wrong_type("a list")
+        return [self._member(index, f"item {index + 1}") for index in range(len(self.value))]
+
+    def text(self) -> str:
+        """Return the string with its variables replaced."""
+        if not isinstance(self.value, str):
+            raise self._wrong_type("a string", "Put it in quotes.")
+        return _VARIABLE.sub(self._replacement, self.value)
+
+    def whole_number(self) -> int:
+        """Return the number, which may also be given as a string, for instance through a variable."""
+        if isinstance(self.value, int) and not isinstance(self.value, bool):
+            return int(self.value)
+        text = self.text() if isinstance(self.value, str) else ""
+        if not re.fullmatch(r"\d+", text, re.ASCII):
+            raise self._wrong_type("a whole number")
+        return int(text)
+
+    def _member(self, key: str | int, title: str) -> Node:
+        # A key that came through a merge (`<<: *anchor`) has no place of its own: its mapping gives the line.
+        places = self.value.lc.data or {}
+        line = places[key][0] + 1 if key in places else self.line
+        name = title if self.name == "the file" else f"{self.name}.{title}"
+        return replace(self, value=self.value[key], name=name, line=line)
+
+    def _wrong_type(self, wanted: str, remedy: str = "Correct the value.") -> FileError:
+        return self.error(f"must be {wanted}, but is {_kind(self.value)}.", remedy)
+
+    def _replacement(self, found: re.Match[str]) -> str:
+        """Return what stands for one `$...` (Compose file reference, "Interpolation").
+
+        Deviation: a variable that is not set and has no default is an error here, where Compose warns and
+        takes the empty string, because an address or a file name that is empty by accident fails much later.
+        Nested defaults and the forms `:?` and `:+` are errors too.
+        """
+        if found["dollar"]:
+            return "$"
+        name = found["plain"] or found["braced"]
+        if not name:
+            raise self.error(
+                f"has a `$` that cannot be replaced: {self.value!r}.",
+                "Write ${NAME}, ${NAME:-default} or ${NAME-default}, and $$ for a dollar sign.",
+            )
+        value = self.environment.get(name)
+        if value or (value is not None and found["sign"] != ":-"):
+            return value
+        if found["default"] is None:
+            raise self.error(
+                f"needs the variable {name}, which is not set.",
+                f"Set it, or write ${{{name}:-default}} in the file.",
+            )
+        return found["default"]
+
+
+def _kind(value: object) -> str:
+    if value is None:
+        return "empty"
+    if isinstance(value, dict):
+        return "a mapping"
+    if isinstance(value, list):
+        return "a list"
+    return repr(value)

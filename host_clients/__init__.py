@@ -1,0 +1,1 @@
+"""The desktop side of the round-trip experiment: one closed-loop client per callback."""

@@ -1,0 +1,101 @@
+"""One client as a process: from its arguments until its last answer or a signal."""
+
+from __future__ import annotations
+
+import signal
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from host_clients.closed_loop import ClosedLoop
+from host_clients.suite import exchange
+from reconros_zenoh.clock.virtual import succeed_once
+from reconros_zenoh.clock.wall import WallEnvironment, keep_time
+from reconros_zenoh.errors import TransportError
+from reconros_zenoh.rmw.node import Context
+from reconros_zenoh.ros.types import TypeRegistry
+from reconros_zenoh.transport.memory import tune_malloc
+from reconros_zenoh.transport.zenoh import ZenohTransport
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    import simpy
+
+    from reconros_zenoh.measure.record import RoundTrip
+    from reconros_zenoh.transport.base import Transport
+
+
+@dataclass(frozen=True, slots=True)
+class ClientOptions:
+    """What a client process is told.
+
+    With `group` it waits until `members` clients of that group are warm, so that all begin together.
+    """
+
+    name: str
+    router: str
+    requests: int
+    limit_s: float = 2.0
+    wait_s: float = 30.0
+    domain: int = 0
+    seed: int = 0
+    group: str | None = None
+    members: int = 1
+
+
+def run_client(options: ClientOptions, on_round_trip: Callable[[RoundTrip], None]) -> bool:
+    """Make the round trips; return True when all were made, False after SIGINT or SIGTERM.
+
+    Raise TransportError when there is no router, or when no board answers within `wait_s`.
+    """
+    keep_time()
+    tune_malloc()
+    environment = WallEnvironment()
+    stop = environment.event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: environment.post(succeed_once, stop))
+    with ZenohTransport.open(options.router) as transport:
+        node = Context(transport, options.domain).node(f"{options.name}_client")
+        start = environment.event()
+        loop = ClosedLoop(
+            environment,
+            exchange(options.name, options.seed),
+            node,
+            TypeRegistry(),
+            requests=options.requests,
+            limit_ns=round(options.limit_s * 1e9),
+            start=start,
+            on_round_trip=on_round_trip,
+        )
+        patience = environment.timeout(round(options.wait_s * 1e9))
+        environment.run(until=loop.warm | patience | stop)
+        if not (loop.warm.triggered or stop.triggered):
+            raise TransportError(
+                f"no board answered the {options.name} client within {options.wait_s:g} s. Start one with "
+                f"`reconros board`, with the same --router and --domain."
+            )
+        if options.group is not None:
+            _gather(transport, environment, start, options)
+        else:
+            start.succeed()
+        environment.run(until=loop.done | stop)
+        node.close()
+        return loop.done.triggered
+
+
+def _gather(
+    transport: Transport, environment: WallEnvironment, start: simpy.Event, options: ClientOptions
+) -> None:
+    """Let `start` happen once all members of the group have announced that they are warm."""
+    present: set[str] = set()
+
+    def on_change(key: str, alive: bool) -> None:
+        # One that has finished and gone was there all the same.
+        if alive:
+            present.add(key)
+        if len(present) >= options.members:
+            environment.post(succeed_once, start)
+
+    prefix = f"reconros/clients/{options.group}"
+    transport.watch_tokens(f"{prefix}/*", on_change)
+    transport.declare_token(f"{prefix}/{options.name}")

@@ -1,0 +1,91 @@
+"""What a client asks a board, and when an answer is right."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from functools import cache
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from reconros_zenoh.rmw.node import Node
+    from reconros_zenoh.ros.types import TypeRegistry
+
+
+class Exchange(ABC):
+    """Requests in a cycle, and the right answer to each.
+
+    `asks` is False for a client that only listens. An answer is the message that came, or the error that came
+    instead; `on_answer` is called on a thread of the transport.
+    """
+
+    name: str
+    asks = True
+
+    @abstractmethod
+    def open(
+        self,
+        node: Node,
+        types: TypeRegistry,
+        on_answer: Callable[[Any], None],
+        on_matching: Callable[[bool], None],
+    ) -> None:
+        """Declare the endpoints; `on_matching` is told whether somebody serves the requests."""
+
+    @abstractmethod
+    def ask(self, index: int) -> None:
+        """Send request number `index`."""
+
+    @abstractmethod
+    def is_right(self, index: int, answer: Any) -> bool:
+        """Tell whether `answer` is the right one to request number `index`."""
+
+
+class TopicExchange(Exchange):
+    """Publishes requests on one topic and listens for the answers on another: base of three clients."""
+
+    request_topic: str
+    request_type: str
+    answer_topic: str
+    answer_type: str
+
+    def __init__(self, inputs: Sequence[Any]) -> None:
+        self._inputs = inputs
+        self._expected = cache(self.expected)
+
+    @abstractmethod
+    def request(self, types: TypeRegistry, given: Any) -> object:
+        """Return the request message for one input."""
+
+    @abstractmethod
+    def expected(self, index: int) -> Any:
+        """Return the right answer to input number `index`."""
+
+    @abstractmethod
+    def equal(self, message: Any, expected: Any) -> bool:
+        """Tell whether a message carries the expected answer."""
+
+    def open(
+        self,
+        node: Node,
+        types: TypeRegistry,
+        on_answer: Callable[[Any], None],
+        on_matching: Callable[[bool], None],
+    ) -> None:
+        """Subscribe to the answers, then announce the requests."""
+        self._requests = [self.request(types, given) for given in self._inputs]
+        node.subscription(
+            types.message(self.answer_type), self.answer_topic, lambda received: on_answer(received.message)
+        )
+        self._publisher = node.publisher(
+            types.message(self.request_type), self.request_topic, on_matching=on_matching
+        )
+
+    def ask(self, index: int) -> None:
+        """Publish request number `index`, counting round and round."""
+        self._publisher.publish(self._requests[index % len(self._requests)])
+
+    def is_right(self, index: int, answer: Any) -> bool:
+        """Tell whether `answer` is the right one to request number `index`."""
+        return self.equal(answer, self._expected(index % len(self._inputs)))

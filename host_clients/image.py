@@ -1,0 +1,27 @@
+"""Pictures as sensor_msgs/Image."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from reconros_zenoh.ros.types import TypeRegistry
+
+
+def image_message(types: TypeRegistry, encoding: str, picture: NDArray[np.uint8]) -> object:
+    """Return the message of a picture, uint8[height, width] or uint8[height, width, channels]."""
+    header = types.message("std_msgs/msg/Header").cls(
+        stamp=types.message("builtin_interfaces/msg/Time").cls(sec=0, nanosec=0), frame_id=""
+    )
+    return types.message("sensor_msgs/msg/Image").cls(
+        header=header,
+        height=picture.shape[0],
+        width=picture.shape[1],
+        encoding=encoding,
+        is_bigendian=0,
+        step=picture[0].size,
+        data=picture.reshape(-1),
+    )

@@ -1,0 +1,43 @@
+"""Sobel client: sends pictures to be filtered."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from host_clients.exchange import TopicExchange
+from host_clients.image import image_message
+from reconros_zenoh.applications.roundtrip.inputs import images
+from reconros_zenoh.applications.roundtrip.kernels.sobel import sobel
+
+if TYPE_CHECKING:
+    from numpy.random import Generator
+    from numpy.typing import NDArray
+
+    from reconros_zenoh.ros.types import TypeRegistry
+
+
+class SobelExchange(TopicExchange):
+    """A picture out, its edges back."""
+
+    name = "sobel"
+    request_topic = "/image_raw"
+    request_type = "sensor_msgs/msg/Image"
+    answer_topic = "/filtered"
+    answer_type = "sensor_msgs/msg/Image"
+
+    def __init__(self, rng: Generator) -> None:
+        super().__init__(images(rng, 8))
+
+    def request(self, types: TypeRegistry, given: Any) -> object:
+        """Return the picture as a message."""
+        return image_message(types, "bgr8", given)
+
+    def expected(self, index: int) -> NDArray[np.uint8]:
+        """Return what the kernel computes, as one row of bytes."""
+        return sobel(self._inputs[index]).reshape(-1)
+
+    def equal(self, message: Any, expected: NDArray[np.uint8]) -> bool:
+        """Compare all pixels."""
+        return message.encoding == "bgr8" and np.array_equal(message.data, expected)

@@ -1,0 +1,59 @@
+"""Sort client: calls the sorter service."""
+
+from __future__ import annotations
+
+from importlib import resources
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from host_clients.exchange import Exchange
+from reconros_zenoh.applications.roundtrip.inputs import numbers
+from reconros_zenoh.errors import ReconrosError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.random import Generator
+
+    from reconros_zenoh.rmw.node import Node
+    from reconros_zenoh.ros.types import TypeRegistry
+
+_TYPE = "sorter_msgs/srv/Sort"
+# The loop's own limit is shorter; this one only lets a dead request end.
+_TIMEOUT_NS = 60_000_000_000
+
+
+class SortExchange(Exchange):
+    """2048 numbers out, the same numbers in order back."""
+
+    name = "sort"
+
+    def __init__(self, rng: Generator) -> None:
+        self._inputs = numbers(rng, 16)
+        self._sorted = np.sort(self._inputs, axis=1)
+
+    def open(
+        self,
+        node: Node,
+        types: TypeRegistry,
+        on_answer: Callable[[Any], None],
+        on_matching: Callable[[bool], None],
+    ) -> None:
+        """Announce the client."""
+        folder = resources.files("reconros_zenoh.applications.roundtrip") / "msg"
+        types.add_service(_TYPE, (folder / "sorter_msgs" / "srv" / "Sort.srv").read_text(encoding="utf-8"))
+        service_type = types.service(_TYPE)
+        self._requests = [service_type.request.cls(unsorted=row) for row in self._inputs]
+        self._on_answer = on_answer
+        self._client = node.client(service_type, "/sorter", on_matching)
+
+    def ask(self, index: int) -> None:
+        """Call the service."""
+        self._client.call(self._requests[index % len(self._requests)], self._on_answer, _TIMEOUT_NS)
+
+    def is_right(self, index: int, answer: Any) -> bool:
+        """Compare all numbers."""
+        return not isinstance(answer, ReconrosError) and np.array_equal(
+            answer.sorted, self._sorted[index % len(self._sorted)]
+        )

@@ -1,0 +1,1 @@
+"""ReconROS without the board: ROS 2 callbacks on emulated CPU+FPGA boards over Zenoh."""

@@ -1,0 +1,1 @@
+"""ReconROS projects that ship with the library."""

@@ -1,0 +1,1 @@
+"""The round-trip application: five callbacks and their clients (ReconROS Executor, Section V)."""

@@ -1,0 +1,44 @@
+"""Inverse kinematics: an angle in, a servo index out, one 32-bit word each."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from reconros_zenoh.applications.roundtrip.kernels.inverse import LEGS, inverse_kinematics
+from reconros_zenoh.errors import BadMessageError
+
+if TYPE_CHECKING:
+    from collections.abc import Generator
+
+    import simpy
+
+    from reconros_zenoh.board.callback import HardwareThread, SoftwareContext
+    from reconros_zenoh.board.endpoints import TopicWriter
+
+
+class Inverse:
+    """Subscribes to std_msgs/UInt32, publishes std_msgs/UInt32."""
+
+    def __init__(self, publisher: TopicWriter) -> None:
+        self._publisher = publisher
+
+    def check(self, message: Any) -> None:
+        """Raise BadMessageError for a leg that the platform does not have."""
+        leg = message.data & 0x7
+        if leg >= LEGS:
+            raise BadMessageError("leg", f"leg {leg} was asked for, the platform has 0 to {LEGS - 1}")
+
+    def software(self, message: Any, context: SoftwareContext) -> None:
+        """Publish the servo index."""
+        word = context.compute(inverse_kinematics, message.data)
+        context.publish(self._publisher, self._publisher.message(data=word))
+
+    def hardware(self, thread: HardwareThread) -> Generator[simpy.Event, object, None]:
+        """Publish the servo index (Listing 3)."""
+        message = yield from thread.get_init_data()
+        ram = yield from thread.mem_read(np.array([message.data], np.uint32))
+        word = yield from thread.compute(inverse_kinematics, int(ram[0]))
+        yield from thread.mem_write(np.array([word], np.uint32))
+        yield from thread.publish(self._publisher, self._publisher.message(data=word))

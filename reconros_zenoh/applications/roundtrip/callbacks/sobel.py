@@ -1,0 +1,69 @@
+"""Sobel filter: an image in, its edges out."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from reconros_zenoh.applications.roundtrip.kernels.sobel import SHAPE, sobel
+from reconros_zenoh.errors import BadMessageError
+
+if TYPE_CHECKING:
+    from collections.abc import Generator
+
+    import simpy
+    from numpy.typing import NDArray
+
+    from reconros_zenoh.board.callback import HardwareThread, SoftwareContext
+    from reconros_zenoh.board.endpoints import TopicWriter
+
+HEIGHT, WIDTH, CHANNELS = SHAPE
+
+
+class Sobel:
+    """Subscribes to sensor_msgs/Image, publishes sensor_msgs/Image: bgr8, 640 x 480."""
+
+    def __init__(self, publisher: TopicWriter) -> None:
+        self._publisher = publisher
+
+    def check(self, message: Any) -> None:
+        """Raise BadMessageError for an image of another size or encoding."""
+        check_image(message, "bgr8", HEIGHT, WIDTH, CHANNELS)
+
+    def software(self, message: Any, context: SoftwareContext) -> None:
+        """Publish the filtered image."""
+        edges = context.compute(sobel, message.data.reshape(SHAPE))
+        context.publish(self._publisher, self._answer(message, edges))
+
+    def hardware(self, thread: HardwareThread) -> Generator[simpy.Event, object, None]:
+        """Publish the filtered image (Listing 2)."""
+        message = yield from thread.get_init_data()
+        ram = yield from thread.mem_read(message.data)
+        edges = yield from thread.compute(sobel, ram.reshape(SHAPE))
+        yield from thread.mem_write(edges)
+        yield from thread.publish(self._publisher, self._answer(message, edges))
+
+    def _answer(self, message: Any, edges: NDArray[np.uint8]) -> Any:
+        return self._publisher.message(
+            header=message.header,
+            height=HEIGHT,
+            width=WIDTH,
+            encoding="bgr8",
+            is_bigendian=0,
+            step=WIDTH * CHANNELS,
+            data=edges.reshape(-1),
+        )
+
+
+def check_image(message: Any, encoding: str, height: int, width: int, channels: int) -> None:
+    """Raise BadMessageError unless the image has this encoding and size, without padding between its rows."""
+    if message.encoding != encoding:
+        raise BadMessageError("image_encoding", f"the image is {message.encoding!r}, not {encoding!r}")
+    size = (message.height, message.width, message.step, len(message.data))
+    if size != (height, width, width * channels, height * width * channels):
+        raise BadMessageError(
+            "image_size",
+            f"the image has height {size[0]}, width {size[1]}, step {size[2]} and {size[3]} bytes, not "
+            f"{height}, {width}, {width * channels} and {height * width * channels}",
+        )

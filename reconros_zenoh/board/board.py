@@ -1,0 +1,77 @@
+"""One board: its parts, wired."""
+
+from __future__ import annotations
+
+import random
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from reconros_zenoh.board.cpu import Cpu
+from reconros_zenoh.board.dds import DdsStack
+from reconros_zenoh.board.host import Host
+from reconros_zenoh.board.memif import Memif
+from reconros_zenoh.board.osif import Osif
+from reconros_zenoh.board.slots import ReconfigurableSlot
+from reconros_zenoh.board.spans import Spans
+from reconros_zenoh.board.zycap import ZyCAP
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from reconros_zenoh.board.profile import Profile
+    from reconros_zenoh.clock.virtual import VirtualEnvironment
+    from reconros_zenoh.rmw.node import Context
+
+
+@dataclass(frozen=True, slots=True)
+class SlotPlan:
+    """A slot as the project declares it, with the resources of its regions."""
+
+    slot_id: int
+    lut: int
+    dsp: int
+    bram36: int
+
+
+class Board:
+    """Cores, slots, configuration port, memory interface and communication stack of one board.
+
+    Without a model in its profile (`native`) every part is there and costs nothing. Everything but
+    `Reader.arrive` belongs to the thread of the event loop.
+    """
+
+    def __init__(
+        self,
+        environment: VirtualEnvironment,
+        context: Context,
+        profile: Profile,
+        slots: tuple[SlotPlan, ...],
+        *,
+        name: str = "board0",
+        seed: int = 0,
+        threads: int | None = None,
+    ) -> None:
+        """`threads` run the computations in wall time; None: they run in line, in virtual time."""
+        model = profile.model
+        self.environment = environment
+        self.context = context
+        self.profile = profile
+        self.name = name
+        self.cpu = Cpu(environment, int(model.cores.count.value) if model else 1)
+        self.memif = Memif(environment, model.memif.bandwidth.bytes_per_ns if model else None)
+        self.osif = Osif(self.cpu, model.osif.call.ns if model else 0)
+        self.zycap = ZyCAP(environment, self.cpu, model.icap if model else None, model.dds if model else None)
+        self.dds = DdsStack(environment, self.cpu, model, random.Random(f"{seed} {name}"))
+        self.host = Host(environment, threads)
+        self.spans = Spans()
+        self.slots: Mapping[int, ReconfigurableSlot] = {
+            plan.slot_id: ReconfigurableSlot(
+                plan.slot_id, profile.bitstream_size(plan.lut, plan.dsp, plan.bram36)
+            )
+            for plan in slots
+        }
+
+    def close(self) -> None:
+        """Let running computations end; the board does nothing any more."""
+        self.zycap.deinit()
+        self.host.close()

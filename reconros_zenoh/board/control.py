@@ -1,0 +1,112 @@
+"""What a board tells about itself, and how others ask: `reconros/<board>/...`, msgpack, versioned."""
+
+from __future__ import annotations
+
+from queue import SimpleQueue
+from typing import TYPE_CHECKING, Any
+
+import msgpack
+
+from reconros_zenoh.clock.wall import WallEnvironment
+from reconros_zenoh.errors import TransportError, UsageError
+
+if TYPE_CHECKING:
+    from reconros_zenoh.board.board import Board
+    from reconros_zenoh.board.executor import Executor
+    from reconros_zenoh.transport.base import Declaration, Reply, Request, Transport
+
+VERSION = 1
+_ANSWER_NS = 2_000_000_000
+
+
+def alive_key(board: str) -> str:
+    """Return the key of the liveliness token that a ready board of this name holds."""
+    return f"reconros/{board}/alive"
+
+
+def claim_name(transport: Transport, board: str) -> None:
+    """Raise UsageError when a board of this name is there already."""
+    if transport.tokens(alive_key(board), _ANSWER_NS):
+        raise UsageError(
+            f"a board named {board!r} is running already. Stop it, or start this one with --name."
+        )
+
+
+class ControlServer:
+    """Answers `reconros/<board>/status` and holds the board's liveliness token until closed."""
+
+    def __init__(self, board: Board, executor: Executor) -> None:
+        self._board = board
+        self._executor = executor
+        transport = board.context.transport
+        self._declarations: list[Declaration] = [
+            transport.serve(f"reconros/{board.name}/status", self._on_status),
+            transport.declare_token(alive_key(board.name)),
+        ]
+
+    def close(self) -> None:
+        """Withdraw token and queryable."""
+        for declaration in reversed(self._declarations):
+            declaration.close()
+
+    def _on_status(self, request: Request) -> None:
+        # The board's state belongs to the thread of its event loop.
+        self._board.environment.post(self._reply_status, request)
+
+    def _reply_status(self, request: Request) -> None:
+        request.reply((msgpack.packb(status(self._board, self._executor)),), None)
+
+
+def status(board: Board, executor: Executor) -> dict[str, Any]:
+    """Return what the board is and what it has done so far; called by the thread of its event loop.
+
+    `host` says how well this host kept up: results later than the model had them ready (`overruns`) and how late
+    the event loop was (`lag_*`, wall time only).
+    """
+    overruns = board.host.overruns
+    lag = board.environment.lag() if isinstance(board.environment, WallEnvironment) else None
+    return {
+        "version": VERSION,
+        "board": board.name,
+        "profile": board.profile.name,
+        "domain": board.context.domain,
+        "executor": executor.kind,
+        "callbacks": executor.statistics(),
+        "slots": [
+            {
+                "id": slot.slot_id,
+                "holds": slot.holds.callback if slot.holds else None,
+                "reconfigurations": slot.reconfigurations,
+                "reconfiguration_ms": slot.reconfiguration_ns / 1e6,
+                "busy_ms": slot.busy_ns / 1e6,
+            }
+            for slot in board.slots.values()
+        ],
+        "spans_ms": board.spans.mean_ms(),
+        "rejected": dict(board.context.rejections.counts()),
+        "host": {
+            "overruns": overruns.count,
+            "overrun_ms": overruns.total_ns / 1e6,
+            "lag_p50_us": lag.p50_us if lag else None,
+            "lag_p99_us": lag.p99_us if lag else None,
+        },
+    }
+
+
+def ask_status(transport: Transport, board: str) -> dict[str, Any]:
+    """Return the status of the board of that name; raise TransportError when it does not answer."""
+    replies: SimpleQueue[Reply | None] = SimpleQueue()
+    querier = transport.request(f"reconros/{board}/status")
+    querier.get((b"",), None, replies.put, _ANSWER_NS)
+    reply = replies.get()
+    querier.close()
+    if reply is None or reply.payload is None:
+        raise TransportError(
+            f"no board named {board!r} answers. Start it with `reconros board --name {board}`."
+        )
+    answer: dict[str, Any] = msgpack.unpackb(reply.payload)
+    if answer.get("version") != VERSION:
+        raise TransportError(
+            f"board {board!r} speaks version {answer.get('version')} of the status, not {VERSION}."
+        )
+    return answer

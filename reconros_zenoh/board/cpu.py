@@ -1,0 +1,41 @@
+"""The processor cores of a board."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from reconros_zenoh.board.sharing import SharedResource
+
+if TYPE_CHECKING:
+    from collections.abc import Generator
+
+    import simpy
+
+    from reconros_zenoh.clock.virtual import VirtualEnvironment
+
+
+class Cpu:
+    """Cores on which the communication stack comes first and all other threads share what is left.
+
+    A thread runs on one core at a time. The stack has fixed priority because its work is done by the kernel's
+    network code and by the threads of the DDS, which never wait long for a callback to end.
+    """
+
+    def __init__(self, environment: VirtualEnvironment, cores: int) -> None:
+        self._cores = SharedResource(environment, capacity=cores, per_job=1)
+
+    def run(self, core_time_ns: float) -> Generator[simpy.Event, object, None]:
+        """Return when a thread has had `core_time_ns` on the cores."""
+        return self._cores.serve(core_time_ns)
+
+    def run_stack(self, core_time_ns: float) -> Generator[simpy.Event, object, None]:
+        """Return when the communication stack has had `core_time_ns` on the cores."""
+        return self._cores.serve(core_time_ns, first=True)
+
+    def stall_stack(self) -> None:
+        """Keep the communication stack from running until `resume_stack`."""
+        self._cores.hold_first()
+
+    def resume_stack(self) -> None:
+        """Take back one `stall_stack`."""
+        self._cores.release_first()

@@ -1,0 +1,247 @@
+"""The ends of topics, services and timers on a board: what makes a callback ready, and where its answer goes."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING, Any, Protocol
+
+from reconros_zenoh.board.spans import Timeline
+from reconros_zenoh.board.stream import Stream
+from reconros_zenoh.ros.qos import QosProfile
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Generator
+
+    import simpy
+
+    from reconros_zenoh.board.board import Board
+    from reconros_zenoh.rmw.node import Node
+    from reconros_zenoh.rmw.received import Received, Responder
+    from reconros_zenoh.ros.types import MessageType, ServiceType
+    from reconros_zenoh.transport.base import Parts
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """What a worker takes: the message of the callback (None for a timer) and its timeline so far."""
+
+    message: Any
+    timeline: Timeline
+    responder: Responder | None = None
+
+
+class Source(Protocol):
+    """What makes a callback ready."""
+
+    @property
+    def dropped(self) -> int:
+        """How many events were pushed out by newer ones before a worker took them."""
+
+    def open(self, on_ready: Callable[[], None], check: Callable[[Any], None] | None) -> None:
+        """Begin; `on_ready` is called by the event loop whenever an event has come.
+
+        `check` raises BadMessageError for a message that the callback cannot use.
+        """
+
+    def is_ready(self) -> bool:
+        """Tell whether an event waits."""
+
+    def take(self) -> Event:
+        """Remove the oldest event and return it."""
+
+    def answer(self, event: Event, response: object) -> None:
+        """Pass on what the callback returned."""
+
+
+class Reader:
+    """The queue of messages behind the communication stack: base of subscriptions and service servers.
+
+    It keeps the last `depth` messages (KEEP_LAST) and counts in `dropped` what it pushed out.
+    """
+
+    def __init__(self, board: Board, depth: int) -> None:
+        self._board = board
+        self._queue: deque[Event] = deque(maxlen=depth)
+        self._stream: Stream[tuple[Received, Timeline]] = Stream(board.environment, self._receive, depth)
+        self._overwritten = 0
+        self._on_ready: Callable[[], None] = lambda: None
+
+    @property
+    def dropped(self) -> int:
+        """How many messages were pushed out by newer ones."""
+        return self._overwritten + self._stream.dropped
+
+    def arrive(self, received: Received) -> None:
+        """Accept a message from the transport; callable from any thread."""
+        self._board.environment.post(self._enter, received)
+
+    def is_ready(self) -> bool:
+        """Tell whether a message waits."""
+        return bool(self._queue)
+
+    def take(self) -> Event:
+        """Remove the oldest message and return it."""
+        event = self._queue.popleft()
+        event.timeline.mark("queue")
+        return event
+
+    def answer(self, event: Event, response: object) -> None:
+        """Do nothing: what a subscriber's callback returns goes nowhere."""
+
+    def _enter(self, received: Received) -> None:
+        environment = self._board.environment
+        self._stream.put((received, Timeline(environment, environment.now - received.transit_ns)))
+
+    def _receive(self, item: tuple[Received, Timeline]) -> Generator[simpy.Event, object, None]:
+        received, timeline = item
+        # What it waited behind its predecessor counts as time on the way.
+        transit_ns = self._board.environment.now - timeline.started_ns
+        yield from self._board.dds.receive(received.size, transit_ns, timeline)
+        if len(self._queue) == self._queue.maxlen:
+            self._overwritten += 1
+        self._queue.append(Event(received.message, timeline, received.responder))
+        self._on_ready()
+
+
+class SubscriptionSource(Reader):
+    """A subscription: ready while a message waits."""
+
+    def __init__(
+        self, board: Board, node: Node, message_type: MessageType, topic: str, qos: QosProfile | None = None
+    ) -> None:
+        self._qos = qos or QosProfile()
+        super().__init__(board, self._qos.depth)
+        self._node = node
+        self._type = message_type
+        self._topic = topic
+
+    def open(self, on_ready: Callable[[], None], check: Callable[[Any], None] | None) -> None:
+        """Subscribe."""
+        self._on_ready = on_ready
+        self._node.subscription(self._type, self._topic, self.arrive, self._qos, check)
+
+
+class ServiceSource(Reader):
+    """A service server: ready while a request waits."""
+
+    def __init__(self, board: Board, node: Node, service_type: ServiceType, name: str) -> None:
+        super().__init__(board, QosProfile().depth)
+        self._node = node
+        self._type = service_type
+        self._name = name
+        self._writer = Writer(board, QosProfile().depth)
+
+    def open(self, on_ready: Callable[[], None], check: Callable[[Any], None] | None) -> None:
+        """Serve."""
+        self._on_ready = on_ready
+        self._node.service(self._type, self._name, self.arrive, check)
+
+    def answer(self, event: Event, response: object) -> None:
+        """Send the response to the client."""
+        assert event.responder is not None
+        parts = self._type.response.encode(response)
+        self._writer.put(parts, event.timeline, partial(event.responder.respond_encoded, parts))
+
+
+class TimerSource:
+    """A periodic timer on the board's clock.
+
+    Expiries that nobody took before the next are one, as in rcl; the others count in `dropped`.
+    """
+
+    def __init__(self, board: Board, period_ns: int) -> None:
+        self._board = board
+        self._period_ns = period_ns
+        self._expired_ns: int | None = None
+        self.dropped = 0
+
+    def open(self, on_ready: Callable[[], None], check: Callable[[Any], None] | None) -> None:  # noqa: ARG002
+        """Let the first period begin."""
+        self._board.environment.process(self._run(on_ready))
+
+    def is_ready(self) -> bool:
+        """Tell whether the period has expired: `ros_timer_is_ready()`."""
+        return self._expired_ns is not None
+
+    def take(self) -> Event:
+        """Begin to wait for the next expiry."""
+        assert self._expired_ns is not None
+        timeline = Timeline(self._board.environment, self._expired_ns)
+        timeline.mark("queue")
+        self._expired_ns = None
+        return Event(None, timeline)
+
+    def answer(self, event: Event, response: object) -> None:
+        """Do nothing: what a timer's callback returns goes nowhere."""
+
+    def _run(self, on_ready: Callable[[], None]) -> Generator[simpy.Event, object, None]:
+        environment = self._board.environment
+        while True:
+            yield environment.timeout(self._period_ns)
+            if self._expired_ns is None:
+                self._expired_ns = environment.now
+            else:
+                self.dropped += 1
+            on_ready()
+
+
+@dataclass(frozen=True, slots=True)
+class _Outgoing:
+    send: Callable[[], None]
+    size: int
+    timeline: Timeline
+
+
+class Writer:
+    """Takes messages through the stack and over the link in order, then sends them.
+
+    At most `depth` wait; a further one pushes the oldest out.
+    """
+
+    def __init__(self, board: Board, depth: int) -> None:
+        self._board = board
+        self._stream: Stream[_Outgoing] = Stream(board.environment, self._send, depth)
+
+    @property
+    def dropped(self) -> int:
+        """How many messages were pushed out by newer ones."""
+        return self._stream.dropped
+
+    def put(self, parts: Parts, timeline: Timeline, send: Callable[[], None]) -> None:
+        """Have `send` called when a message of these parts has gone through the stack and over the link."""
+        self._stream.put(_Outgoing(send, sum(len(part) for part in parts), timeline))
+
+    def _send(self, outgoing: _Outgoing) -> Generator[simpy.Event, object, None]:
+        yield from self._board.dds.send(outgoing.size, outgoing.timeline)
+        outgoing.send()
+        self._board.spans.add(outgoing.timeline)
+
+
+class TopicWriter:
+    """A publisher of the board."""
+
+    def __init__(
+        self, board: Board, node: Node, message_type: MessageType, topic: str, qos: QosProfile | None = None
+    ) -> None:
+        qos = qos or QosProfile()
+        self._writer = Writer(board, qos.depth)
+        self._publisher = node.publisher(message_type, topic, qos)
+
+    @property
+    def dropped(self) -> int:
+        """How many messages were pushed out by newer ones."""
+        return self._writer.dropped
+
+    def message(self, **fields: object) -> Any:
+        """Return a message of the topic's type with these fields."""
+        return self._publisher.message_type.cls(**fields)
+
+    def encode(self, message: object) -> Parts:
+        """Return the message as it goes over the wire; callable from any thread."""
+        return self._publisher.message_type.encode(message)
+
+    def send(self, parts: Parts, timeline: Timeline) -> None:
+        """Publish an encoded message."""
+        self._writer.put(parts, timeline, partial(self._publisher.publish_encoded, parts))

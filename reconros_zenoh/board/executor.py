@@ -1,0 +1,214 @@
+"""The executor on a board: what ReconROS_Executor_Init, _Add_HW_Callback, _Add_SW_Callback and _Spin do."""
+
+from __future__ import annotations
+
+import logging
+from collections import Counter
+from dataclasses import dataclass, field
+from functools import partial
+from typing import TYPE_CHECKING, Any, Literal
+
+from reconros_zenoh.board.bitstream import Bitstream, read_bitstreams
+from reconros_zenoh.board.callback import HardwareImplementation
+from reconros_zenoh.board.workers import HardwareWorker, SoftwareWorker
+from reconros_zenoh.errors import UsageError
+from reconros_zenoh.executor.callbacks import CallbackEntry, CallbackKind
+from reconros_zenoh.executor.reconros import ReconrosExecutor
+from reconros_zenoh.executor.resource_mask import ResourceMask
+from reconros_zenoh.executor.standard import StandardExecutor
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+    from pathlib import Path
+
+    from reconros_zenoh.board.board import Board
+    from reconros_zenoh.board.callback import HardwareCallback, SoftwareCallback
+    from reconros_zenoh.board.endpoints import Event, Source
+    from reconros_zenoh.board.workers import Worker
+    from reconros_zenoh.executor.callbacks import Dispatch
+
+_log = logging.getLogger(__name__)
+
+ExecutorKind = Literal["reconros", "standard"]
+
+
+@dataclass(slots=True)
+class _Registration:
+    kind: CallbackKind
+    source: Source
+    check: Callable[[Any], None] | None
+    software: SoftwareCallback | None = None
+    slots: dict[int, HardwareCallback] = field(default_factory=dict)
+
+
+class Executor:
+    """Runs callbacks on a board with m software and n hardware workers.
+
+    Callbacks are added, then `spin` starts the workers (ReconROS Executor, Section IV, Listing 4). `kind` "standard"
+    is the executor of ROS 2, which knows software workers only. Hardware workers serve the slots in the order of
+    their ids. `bitstreams` is the folder of the partial bitstreams; without it they are held in memory only.
+    """
+
+    def __init__(
+        self,
+        board: Board,
+        software_workers: int,
+        hardware_workers: int,
+        bitstreams: Path | None = None,
+        kind: ExecutorKind = "reconros",
+    ) -> None:
+        if hardware_workers > len(board.slots):
+            raise UsageError(
+                f"{hardware_workers} hardware workers need as many slots, the project has {len(board.slots)}."
+            )
+        if kind == "standard" and hardware_workers:
+            raise UsageError('the standard executor has no hardware workers; use executor = "reconros".')
+        self.board = board
+        self.kind = kind
+        self._software_workers = software_workers
+        self._slots = [board.slots[slot_id] for slot_id in sorted(board.slots)[:hardware_workers]]
+        self._bitstreams = bitstreams
+        self._policy = StandardExecutor() if kind == "standard" else ReconrosExecutor()
+        self._registrations: dict[str, _Registration] = {}
+        self._workers: list[Worker] = []
+        self.calls: Counter[str] = Counter()
+        self.failures: Counter[str] = Counter()
+
+    def add_sw_callback(
+        self,
+        name: str,
+        kind: CallbackKind,
+        source: Source,
+        function: SoftwareCallback,
+        check: Callable[[Any], None] | None = None,
+    ) -> None:
+        """Let the callback `name` run as a function; `check` raises BadMessageError for what it cannot use."""
+        if not self._software_workers:
+            raise UsageError(f"callback {name!r} runs in software, but there are no software workers.")
+        self._register(name, kind, source, check).software = function
+
+    def add_hw_callback(
+        self,
+        name: str,
+        slots: Iterable[int],
+        kind: CallbackKind,
+        source: Source,
+        thread: HardwareCallback,
+        check: Callable[[Any], None] | None = None,
+    ) -> None:
+        """Let the callback `name` run in these slots; `check` as in `add_sw_callback`."""
+        served = {slot.slot_id for slot in self._slots}
+        for slot in slots:
+            if slot not in served:
+                raise UsageError(f"callback {name!r} needs slot {slot}, which no hardware worker serves.")
+            self._register(name, kind, source, check).slots[slot] = thread
+
+    def spin(self) -> None:
+        """Load the bitstreams, open every source and start the workers.
+
+        Deviation: it returns at once, because the event loop belongs to the board and may host several.
+        """
+        board = self.board
+        wanted = {
+            (slot, name): Bitstream(slot, name, board.slots[slot].bitstream_size)
+            for name, registration in self._registrations.items()
+            for slot in registration.slots
+        }
+        board.zycap.init(read_bitstreams(self._bitstreams, wanted.values()) if self._bitstreams else wanted)
+        for name, registration in self._registrations.items():
+            slots = {
+                slot: HardwareImplementation(board.zycap.bitstream(slot, name), thread)
+                for slot, thread in registration.slots.items()
+            }
+            entry = CallbackEntry(
+                name,
+                registration.kind,
+                ResourceMask.of(software=registration.software, slots=slots),
+                registration.source,
+            )
+            self._policy.add(entry)
+        model = board.profile.model
+        software_poll_ns = model.executor.software_poll.ns if model and self.kind == "reconros" else 0
+        hardware_poll_ns = model.executor.hardware_poll.ns if model else 0
+        self._workers = [SoftwareWorker(self, software_poll_ns) for _ in range(self._software_workers)]
+        self._workers += [HardwareWorker(self, slot, hardware_poll_ns) for slot in self._slots]
+        for entry in self._policy.callbacks:
+            registration = self._registrations[entry.name]
+            registration.source.open(partial(self._became_ready, entry), registration.check)
+
+    def select(self, worker: Worker, resource: int) -> Dispatch | None:
+        """Return the callback that this worker must run now, its message taken, or None."""
+        dispatch = self._policy.select(worker, resource)
+        if dispatch is not None:
+            self.calls[dispatch.entry.name] += 1
+        return dispatch
+
+    def complete(self, dispatch: Dispatch, event: Event, response: object) -> None:
+        """Note that the callback has run to completion and pass on what it returned."""
+        self._registrations[dispatch.entry.name].source.answer(event, response)
+        self._finish(dispatch)
+
+    def fail(self, dispatch: Dispatch, event: Event, error: Exception) -> None:
+        """Note that the callback raised: it is logged and counted, and the sender of a request is told."""
+        name = dispatch.entry.name
+        self.failures[name] += 1
+        _log.error("callback %s failed", name, exc_info=error)
+        if event.responder is not None:
+            event.responder.fail(f"callback {name} failed: {error}")
+        self._finish(dispatch)
+
+    def statistics(self) -> dict[str, dict[str, object]]:
+        """Return for each callback where it may run, how often it was called and failed, and what was dropped."""
+        return {
+            name: {
+                "kind": registration.kind.name,
+                "software": registration.software is not None,
+                "slots": sorted(registration.slots),
+                "calls": self.calls[name],
+                "failed": self.failures[name],
+                "dropped": registration.source.dropped,
+            }
+            for name, registration in self._registrations.items()
+        }
+
+    @property
+    def dispatch_ns(self) -> int:
+        """The core time [ns] of taking a message and starting its callback."""
+        model = self.board.profile.model
+        return model.executor.dispatch.ns if model else 0
+
+    def software_ns(self, callback: str) -> int | None:
+        """Return the core time [ns] of the callback in software, None where nothing is modelled."""
+        model = self.board.profile.model
+        return model.callbacks[callback].software.ns if model else None
+
+    def compute_ns(self, callback: str) -> int | None:
+        """Return how long [ns] a slot computes for the callback, None where nothing is modelled."""
+        model = self.board.profile.model
+        return model.callbacks[callback].compute.ns if model else None
+
+    def _register(
+        self, name: str, kind: CallbackKind, source: Source, check: Callable[[Any], None] | None
+    ) -> _Registration:
+        model = self.board.profile.model
+        if model and name not in model.callbacks:
+            raise UsageError(
+                f"profile {self.board.profile.name!r} has no times for callback {name!r}. Add a section "
+                f"[model.callbacks.{name}] to a copy of the profile, or use the profile native."
+            )
+        registration = self._registrations.setdefault(name, _Registration(kind, source, check))
+        if registration.source is not source:
+            raise UsageError(f"callback {name!r} is registered already with another source.")
+        return registration
+
+    def _became_ready(self, entry: CallbackEntry) -> None:
+        self._policy.refresh(entry)
+        self._wake(entry)
+
+    def _finish(self, dispatch: Dispatch) -> None:
+        self._policy.finish(dispatch)
+        self._wake(dispatch.entry)
+
+    def _wake(self, entry: CallbackEntry) -> None:
+        for worker in self._workers:
+            worker.wake(entry)

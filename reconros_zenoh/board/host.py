@@ -1,0 +1,108 @@
+"""Where the computations of callbacks really run."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import numpy as np
+import xxhash
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Generator
+
+    import simpy
+
+    from reconros_zenoh.clock.virtual import VirtualEnvironment
+
+R = TypeVar("R")
+_RESULTS_KEPT = 512
+
+
+class _Inline(Executor):
+    """Runs what it is given at once, in the caller's thread."""
+
+    def submit(self, function: Callable[..., R], /, *arguments: Any, **keywords: Any) -> Future[R]:
+        future: Future[R] = Future()
+        try:
+            future.set_result(function(*arguments, **keywords))
+        except Exception as error:  # noqa: BLE001 - handed to whoever asks for the result
+            future.set_exception(error)
+        return future
+
+
+@dataclass(slots=True)
+class Overruns:
+    """How often, and for how long in total [ns], a result came later than the model had it ready."""
+
+    count: int = 0
+    total_ns: int = 0
+
+
+class Host:
+    """Runs the real computation while the model decides when its result is ready.
+
+    In wall time the computations run in a pool of threads. In virtual time they run in line, and a pure kernel
+    computes equal inputs only once.
+    """
+
+    def __init__(self, environment: VirtualEnvironment, threads: int | None) -> None:
+        """`threads` is the size of the pool, None in virtual time."""
+        self._environment = environment
+        self._pool: Executor = (
+            _Inline() if threads is None else ThreadPoolExecutor(threads, thread_name_prefix="callback")
+        )
+        self._remembers = threads is None
+        self._results: OrderedDict[object, object] = OrderedDict()
+        self.overruns = Overruns()
+
+    def start(self, function: Callable[..., R], *arguments: object) -> Future[R]:
+        """Start a computation and return its future."""
+        return self._pool.submit(function, *arguments)
+
+    def result(self, future: Future[R]) -> Generator[simpy.Event, object, R]:
+        """Return the result of a started computation once it is there; raises what it raised."""
+        if not future.done():
+            ready = self._environment.event()
+            future.add_done_callback(lambda _: self._environment.post(ready.succeed))
+            yield ready
+        return future.result()
+
+    def late_result(self, future: Future[R]) -> Generator[simpy.Event, object, R]:
+        """Return the result like `result`, whose time has come in the model: any wait is an overrun."""
+        due_ns = self._environment.now
+        on_time = future.done()
+        try:
+            return (yield from self.result(future))
+        finally:
+            if not on_time:
+                self.overruns.count += 1
+                self.overruns.total_ns += self._environment.now - due_ns
+
+    def compute(self, kernel: Callable[..., R], *arguments: object) -> R:
+        """Return `kernel(*arguments)` of a pure kernel; called in the thread of a started computation."""
+        if not self._remembers:
+            return kernel(*arguments)
+        key = (kernel, *(_identity(argument) for argument in arguments))
+        if key in self._results:
+            self._results.move_to_end(key)
+            return self._results[key]  # type: ignore[return-value] # stored below under the same kernel
+        result = kernel(*arguments)
+        self._results[key] = result
+        if len(self._results) > _RESULTS_KEPT:
+            self._results.popitem(last=False)
+        return result
+
+    def close(self) -> None:
+        """Let running computations end and start no other."""
+        self._pool.shutdown(wait=True, cancel_futures=True)
+
+
+def _identity(argument: object) -> object:
+    """Return something equal for equal arguments: arrays by shape, type and a 128-bit hash of their content."""
+    if isinstance(argument, np.ndarray):
+        content = np.ascontiguousarray(argument)
+        return argument.shape, argument.dtype.str, xxhash.xxh3_128_digest(content.data.cast("B"))
+    return argument

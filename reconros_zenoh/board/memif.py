@@ -1,0 +1,32 @@
+"""The memory interface of the slots."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from reconros_zenoh.board.sharing import SharedResource
+
+if TYPE_CHECKING:
+    from collections.abc import Generator
+
+    import simpy
+
+    from reconros_zenoh.clock.virtual import VirtualEnvironment
+
+
+class Memif:
+    """One memory subsystem behind the MEMIFs of all slots: transfers that overlap share its bandwidth.
+
+    Source: Gateways, Section 2.2 ("the available memory bandwidth is divided by the number of nodes that
+    simultaneously access messages"). `bytes_per_ns` is None where nothing is modelled.
+    """
+
+    def __init__(self, environment: VirtualEnvironment, bytes_per_ns: float | None) -> None:
+        self._modelled = bytes_per_ns is not None
+        self._bus = SharedResource(environment, capacity=bytes_per_ns or 1, per_job=bytes_per_ns or 1)
+        self.transferred_bytes = 0
+
+    def transfer(self, size: int) -> Generator[simpy.Event, object, None]:
+        """Return when `size` bytes have gone from or to the main memory."""
+        self.transferred_bytes += size
+        return self._bus.serve(size if self._modelled else 0)

@@ -1,0 +1,189 @@
+"""What is known of a kind of board: a TOML file of quantities, each with unit and basis."""
+
+from __future__ import annotations
+
+from importlib import resources
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from reconros_zenoh.board.quantity import Bandwidth, CostPerByte, Count, Duration, Fraction, Frequency, Size
+from reconros_zenoh.errors import FileError, UsageError
+from reconros_zenoh.toml_file import TomlFile
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+
+_NATIVE_BITSTREAM_SIZE = 4096
+"""Where nothing is modelled a bitstream only has to exist."""
+
+
+class _Section(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class CoresSection(_Section):
+    """The processor cores."""
+
+    count: Count
+    clock: Frequency
+
+
+class FabricSection(_Section):
+    """The clocks of the reconfigurable part."""
+
+    infrastructure_clock: Frequency
+    thread_clock: Frequency
+
+
+class ExecutorSection(_Section):
+    """What the reference implementation of the executor costs.
+
+    An idle worker looks for work once per poll period. `dispatch` is processor time per callback: taking the
+    message and starting the function or the slot.
+    """
+
+    hardware_poll: Duration
+    software_poll: Duration
+    dispatch: Duration
+
+
+class DdsSection(_Section):
+    """The ROS 2 communication stack on the cores, per message and direction.
+
+    A message of more than `large_from` costs `per_byte_large`. A large message is resent whole with probability
+    `nack_probability`, `nack_delay` after its first copy.
+    """
+
+    per_message: Duration
+    per_byte: CostPerByte
+    per_byte_large: CostPerByte
+    large_from: Size
+    nack_probability: Fraction
+    nack_delay: Duration
+    stalled_by_reconfiguration: bool
+
+
+class LinkSection(_Section):
+    """The network between board and desktop, one way, with the desktop's own share."""
+
+    latency: Duration
+    per_byte: CostPerByte
+
+
+class IcapSection(_Section):
+    """The configuration port: `t_rc = S / bandwidth + offset`, then `settle` until the slot's thread runs."""
+
+    bandwidth: Bandwidth
+    offset: Duration
+    settle: Duration
+
+
+class MemifSection(_Section):
+    """The memory interface that all slots share."""
+
+    bandwidth: Bandwidth
+
+
+class OsifSection(_Section):
+    """The operating system interface: one call through the delegate thread."""
+
+    call: Duration
+
+
+class BitstreamSection(_Section):
+    """The size of a partial bitstream of a slot with these resources."""
+
+    lut: Annotated[int, Field(ge=0)]
+    dsp: Annotated[int, Field(ge=0)]
+    bram36: Annotated[int, Field(ge=0)]
+    size: Size
+
+
+class CallbackSection(_Section):
+    """How long a callback takes in isolation.
+
+    `software` is processor time. `compute` is what the slot computes; with the memory transfers and the calls of
+    the hardware thread it adds up to the execution time in hardware.
+    """
+
+    software: Duration
+    compute: Duration
+
+
+class Model(_Section):
+    """All modelled times of a board."""
+
+    cores: CoresSection
+    fabric: FabricSection
+    executor: ExecutorSection
+    dds: DdsSection
+    link: LinkSection
+    icap: IcapSection
+    memif: MemifSection
+    osif: OsifSection
+    bitstreams: Annotated[tuple[BitstreamSection, ...], Field(min_length=1)]
+    callbacks: dict[str, CallbackSection]
+
+
+class Profile(_Section):
+    """A kind of board; without `model` nothing is modelled and everything takes as long as it takes."""
+
+    name: str
+    description: str
+    model: Model | None = None
+
+    def bitstream_size(self, lut: int, dsp: int, bram36: int) -> int:
+        """Return the size [bytes] of a partial bitstream of a slot with these resources.
+
+        A slot that the profile does not list gets the size per LUT of the listed slots together.
+        """
+        if self.model is None:
+            return _NATIVE_BITSTREAM_SIZE
+        known = self.model.bitstreams
+        for slot in known:
+            if (slot.lut, slot.dsp, slot.bram36) == (lut, dsp, bram36):
+                return slot.size.bytes
+        return round(lut * sum(slot.size.bytes for slot in known) / sum(slot.lut for slot in known))
+
+
+def profile_names() -> list[str]:
+    """Return the names of the profiles that ship."""
+    folder = resources.files("reconros_zenoh.board") / "profiles"
+    return sorted(Path(entry.name).stem for entry in folder.iterdir() if entry.name.endswith(".toml"))
+
+
+def read_profile(name_or_file: str) -> Profile:
+    """Return the shipped profile of that name, or the one in that file.
+
+    Raise FileError with the line for a file that is not a profile, UsageError for an unknown name.
+    """
+    path = Path(name_or_file)
+    if name_or_file in profile_names():
+        with resources.as_file(
+            resources.files("reconros_zenoh.board") / "profiles" / f"{name_or_file}.toml"
+        ) as file:
+            return _read(file)
+    if path.suffix != ".toml":
+        raise UsageError(
+            f"no profile named {name_or_file!r}. Give one of {', '.join(profile_names())} or a .toml file."
+        )
+    return _read(path)
+
+
+def _read(path: Path) -> Profile:
+    toml = TomlFile.read(path)
+    try:
+        return Profile.model_validate(toml.content)
+    except ValidationError as error:
+        first = error.errors()[0]
+        place = [str(key) for key in first["loc"]]
+        raise FileError(
+            path, toml.line(place), f"{'.'.join(place)}: {first['msg']}.", _remedy(place)
+        ) from None
+
+
+def _remedy(place: Iterable[str]) -> str:
+    return f"Correct {'.'.join(place)}; the shipped profiles show every key."

@@ -1,0 +1,131 @@
+"""The worker threads of an executor (ReconROS Executor, Section III-B, Fig. 4)."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import TYPE_CHECKING, cast
+
+from reconros_zenoh.board.callback import HardwareThread, SoftwareContext
+from reconros_zenoh.executor.resource_mask import SOFTWARE
+
+if TYPE_CHECKING:
+    from collections.abc import Generator
+
+    import simpy
+
+    from reconros_zenoh.board.callback import HardwareImplementation, SoftwareCallback
+    from reconros_zenoh.board.endpoints import Event
+    from reconros_zenoh.board.executor import Executor
+    from reconros_zenoh.board.slots import ReconfigurableSlot
+    from reconros_zenoh.executor.callbacks import CallbackEntry, Dispatch
+
+
+class Worker(ABC):
+    """One thread: takes a ready callback, runs it to completion, and looks again.
+
+    A worker that finds nothing looks again once per poll period; it is woken when something became ready and
+    goes on at the next point of that grid (`poll_ns` 0: at once).
+    """
+
+    def __init__(self, executor: Executor, resource: int, poll_ns: int) -> None:
+        self._executor = executor
+        self._board = executor.board
+        self._environment = executor.board.environment
+        self._resource = resource
+        self._poll_ns = poll_ns
+        self._idle: simpy.Event | None = None
+        self._environment.process(self._run())
+
+    def wake(self, entry: CallbackEntry) -> None:
+        """Say that the callback of this entry may have become ready."""
+        if self._idle is not None and self._resource in entry.mask:
+            self._idle.succeed()
+            self._idle = None
+
+    def _run(self) -> Generator[simpy.Event, object, None]:
+        while True:
+            dispatch = self._executor.select(self, self._resource)
+            if dispatch is None:
+                dispatch = yield from self._wait()
+            event = cast("Event", dispatch.message)
+            event.timeline.callback = dispatch.entry.name
+            try:
+                response = yield from self._execute(dispatch, event)
+            except Exception as error:  # noqa: BLE001 - a callback may raise anything; the board goes on
+                self._executor.fail(dispatch, event, error)
+            else:
+                self._executor.complete(dispatch, event, response)
+
+    def _wait(self) -> Generator[simpy.Event, object, Dispatch]:
+        idle_since_ns = self._environment.now
+        while True:
+            self._idle = self._environment.event()
+            yield self._idle
+            if self._poll_ns:
+                missed_ns = (self._environment.now - idle_since_ns) % self._poll_ns
+                if missed_ns:
+                    yield self._environment.timeout(self._poll_ns - missed_ns)
+            dispatch = self._executor.select(self, self._resource)
+            if dispatch is not None:
+                return dispatch
+
+    @abstractmethod
+    def _execute(self, dispatch: Dispatch, event: Event) -> Generator[simpy.Event, object, object]:
+        """Run the callback to completion and return what it returned."""
+
+
+class SoftwareWorker(Worker):
+    """Runs callbacks as functions on a core."""
+
+    def __init__(self, executor: Executor, poll_ns: int) -> None:
+        super().__init__(executor, SOFTWARE, poll_ns)
+
+    def _execute(self, dispatch: Dispatch, event: Event) -> Generator[simpy.Event, object, object]:
+        board, timeline = self._board, event.timeline
+        yield from board.cpu.run(self._executor.dispatch_ns)
+        timeline.mark("dispatch")
+        context = SoftwareContext(board.host)
+        callback = cast("SoftwareCallback", dispatch.implementation)
+        future = board.host.start(callback, event.message, context)
+        core_time_ns = self._executor.software_ns(dispatch.entry.name)
+        if core_time_ns is None:
+            response = yield from board.host.result(future)
+            timeline.mark("execution")
+        else:
+            yield from board.cpu.run(core_time_ns)
+            timeline.mark("execution")
+            response = yield from board.host.late_result(future)
+            timeline.mark("overrun")
+        for publication in context.publications:
+            publication.writer.send(publication.parts, timeline.fork())
+        return response
+
+
+class HardwareWorker(Worker):
+    """Runs callbacks in one reconfigurable slot."""
+
+    def __init__(self, executor: Executor, slot: ReconfigurableSlot, poll_ns: int) -> None:
+        super().__init__(executor, slot.slot_id, poll_ns)
+        self._slot = slot
+
+    def _execute(self, dispatch: Dispatch, event: Event) -> Generator[simpy.Event, object, object]:
+        board, timeline = self._board, event.timeline
+        yield from board.cpu.run(self._executor.dispatch_ns)
+        timeline.mark("dispatch")
+        implementation = cast("HardwareImplementation", dispatch.implementation)
+        yield from board.zycap.write_bitstream(self._slot, implementation.bitstream)
+        timeline.mark("reconfiguration")
+        started_ns = self._environment.now
+        thread = HardwareThread(
+            self._environment,
+            event.message,
+            memif=board.memif,
+            osif=board.osif,
+            host=board.host,
+            compute_ns=self._executor.compute_ns(dispatch.entry.name),
+            timeline=timeline,
+        )
+        try:
+            return (yield from implementation.callback(thread))
+        finally:
+            self._slot.busy_ns += self._environment.now - started_ns

@@ -1,0 +1,42 @@
+"""`reconros build`: the bitstream files of a project."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from reconros_zenoh.board.profile import read_profile
+from reconros_zenoh.project.loader import load_project
+
+
+def build(
+    project: Annotated[Path, typer.Argument(help="Folder of a ReconROS project.")],
+    out: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Where to write.", show_default="PROJECT/bitstreams")
+    ] = None,
+    profile: Annotated[
+        str, typer.Option(metavar="NAME|FILE", help="The kind of board, which decides the sizes.")
+    ] = "miniitx-zynq7100",
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
+) -> None:
+    """Write a partial bitstream for each callback and each slot it can be built for."""
+    folder = out or project / "bitstreams"
+    bitstreams = load_project(project).bitstreams(read_profile(profile))
+    written = [bitstream.write(folder) for bitstream in bitstreams]
+    if as_json:
+        print(
+            json.dumps(
+                {
+                    "bitstreams": [
+                        {"file": str(path), "slot": b.slot, "callback": b.callback, "bytes": b.size}
+                        for path, b in zip(written, bitstreams, strict=True)
+                    ]
+                }
+            )
+        )
+        return
+    for path, bitstream in zip(written, bitstreams, strict=True):
+        print(f"{path}  {bitstream.size} bytes")

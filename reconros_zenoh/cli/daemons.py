@@ -1,0 +1,128 @@
+"""`reconros router`, `board`, `client` and `status`: the processes of a deployment."""
+
+from __future__ import annotations
+
+import json
+import signal
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+
+from reconros_zenoh.board.control import ask_status
+from reconros_zenoh.errors import UsageError
+from reconros_zenoh.experiments.roundtrip import application_folder
+from reconros_zenoh.measure.record import RecordWriter, RoundTrip
+from reconros_zenoh.transport.zenoh import ZenohRouter, ZenohTransport
+
+_ENDPOINT = "tcp/127.0.0.1:7447"
+Router = Annotated[
+    str, typer.Option(metavar="ENDPOINT", envvar="RECONROS_ROUTER", help="The Zenoh router to connect to.")
+]
+Domain = Annotated[int, typer.Option(min=0, max=232, envvar="ROS_DOMAIN_ID", help="The ROS domain.")]
+AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
+
+
+class ClientName(StrEnum):
+    """The five clients."""
+
+    SORT = "sort"
+    INVERSE = "inverse"
+    SOBEL = "sobel"
+    MNIST = "mnist"
+    HASH = "hash"
+
+
+def router(
+    listen: Annotated[
+        str,
+        typer.Option(
+            metavar="ENDPOINT", help="Where to listen; tcp/[::]:7447 takes sessions of other hosts too."
+        ),
+    ] = _ENDPOINT,
+) -> None:
+    """Run a Zenoh router until Ctrl-C; any rmw_zenoh router serves as well."""
+    with ZenohRouter.open(listen):
+        print(f"router listens on {listen}", flush=True)
+        signal.sigwait({signal.SIGINT, signal.SIGTERM})
+
+
+def board(
+    project: Annotated[
+        Path, typer.Argument(help="Folder of a ReconROS project.", show_default="the round-trip application")
+    ] = application_folder(),
+    mapping: Annotated[
+        str, typer.Option(metavar="NAME|FILE", help="Which callback runs where.")
+    ] = "all_hardware",
+    profile: Annotated[
+        str, typer.Option(metavar="NAME|FILE", help="The kind of board; native models nothing.")
+    ] = "miniitx-zynq7100",
+    name: Annotated[str, typer.Option(help="The board's name in the network.")] = "board0",
+    router: Router = _ENDPOINT,
+    domain: Domain = 0,
+    seed: Annotated[int, typer.Option(help="Seed of what is random in the model.")] = 0,
+    bitstreams: Annotated[
+        Path | None,
+        typer.Option(help="Folder of `reconros build`.", show_default="bitstreams held in memory"),
+    ] = None,
+) -> None:
+    """Run an emulated board that hosts a project, until Ctrl-C."""
+    from board_daemon.daemon import run_board  # noqa: PLC0415 - `router` and `status` start without it
+    from board_daemon.hosting import BoardOptions  # noqa: PLC0415
+    from reconros_zenoh.board.profile import read_profile  # noqa: PLC0415
+    from reconros_zenoh.project.loader import load_project  # noqa: PLC0415
+
+    loaded = load_project(project)
+    run_board(
+        router,
+        read_profile(profile),
+        loaded,
+        loaded.mapping(mapping),
+        BoardOptions(name, domain, seed, bitstreams),
+        lambda: print(f"board {name} serves {project.name} under {mapping} on {profile}", flush=True),
+    )
+
+
+def client(
+    name: Annotated[ClientName, typer.Argument(help="Which client.")],
+    requests: Annotated[int, typer.Option(min=1, help="How many round trips to make.")] = 100,
+    router: Router = _ENDPOINT,
+    domain: Domain = 0,
+    limit: Annotated[
+        float, typer.Option(min=0.001, metavar="SECONDS", help="After this time an answer is lost.")
+    ] = 2.0,
+    wait: Annotated[
+        float, typer.Option(min=0.1, metavar="SECONDS", help="How long to wait for a board.")
+    ] = 30.0,
+    out: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Record each round trip there.", show_default=False)
+    ] = None,
+    seed: Annotated[int, typer.Option(help="Seed of the requests.")] = 0,
+    group: Annotated[
+        str | None, typer.Option(help="Begin together with the others of this group.", show_default=False)
+    ] = None,
+    members: Annotated[int, typer.Option(min=1, help="How many clients the group has.")] = 1,
+    as_json: AsJson = False,
+) -> None:
+    """Make round trips to a board, one after the other, and check every answer."""
+    from host_clients.command import make_round_trips  # noqa: PLC0415 - `router` and `status` start without it
+    from host_clients.daemon import ClientOptions  # noqa: PLC0415
+
+    options = ClientOptions(str(name), router, requests, limit, wait, domain, seed, group, members)
+    raise typer.Exit(make_round_trips(options, out, as_json=as_json))
+
+
+def status(
+    name: Annotated[str, typer.Argument(help="The board, or `router`.")] = "board0",
+    router: Router = _ENDPOINT,
+    as_json: AsJson = False,
+) -> None:
+    """Show what a board is doing; exit status 2 when it does not answer."""
+    with ZenohTransport.open(router) as transport:
+        answer = {"router": router} if name == "router" else ask_status(transport, name)
+    if as_json:
+        print(json.dumps(answer))
+    else:
+        Console().print(answer)

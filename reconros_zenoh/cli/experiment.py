@@ -1,0 +1,115 @@
+"""`reconros experiment`: the experiments of the papers."""
+
+from __future__ import annotations
+
+import json
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+
+from reconros_zenoh.cli.progress import ExperimentProgress
+from reconros_zenoh.errors import UsageError
+from reconros_zenoh.experiments.roundtrip import (
+    BoardReport,
+    Plan,
+    all_right,
+    application_folder,
+    finish,
+    prepare,
+)
+from reconros_zenoh.measure.compare import print_tables
+from reconros_zenoh.project.loader import load_project
+
+app = typer.Typer(help="Run an experiment of the papers on emulated boards.", no_args_is_help=True)
+
+MAPPINGS = ("all_software", "mixed", "all_hardware")
+
+
+class ClockName(StrEnum):
+    """The two clocks."""
+
+    WALL = "wall"
+    VIRTUAL = "virtual"
+
+
+Profile = Annotated[
+    str, typer.Option(metavar="NAME|FILE", help="The kind of board; native models nothing (wall time only).")
+]
+Out = Annotated[Path, typer.Option(metavar="DIR", help="Folder for the records.")]
+Seed = Annotated[int, typer.Option(help="Seed of requests and model.")]
+
+
+@app.command("roundtrip")
+def roundtrip(
+    clock: Annotated[
+        ClockName, typer.Option(help="Real time with processes, or virtual time.")
+    ] = ClockName.WALL,
+    mapping: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME|FILE", help="A mapping, may be repeated.", show_default=", ".join(MAPPINGS)
+        ),
+    ] = None,
+    requests: Annotated[int, typer.Option(min=1, help="Requests per client.")] = 100,
+    seed: Seed = 0,
+    out: Out = Path("results"),
+    profile: Profile = "miniitx-zynq7100",
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
+) -> None:
+    """Section V-C: five clients against one board, under each mapping; beside the real board's round trips.
+
+    Exit status 0 only if every answer was right and nothing was lost.
+    """
+    experiment = run(plan(clock, mapping or MAPPINGS, requests, seed, out, profile), quiet=as_json)
+    if as_json:
+        print(json.dumps(experiment))
+    else:
+        print_tables(Console(), experiment)
+        print(f"records and experiment.json are in {out / clock}")
+    if experiment["interrupted"]:
+        raise typer.Exit(130)
+    raise typer.Exit(0 if all_right(experiment) else 1)
+
+
+def plan(
+    clock: ClockName, mappings: tuple[str, ...] | list[str], requests: int, seed: int, out: Path, profile: str
+) -> Plan:
+    """Return the plan of an experiment; raise UsageError for a mapping or profile that cannot be used."""
+    from reconros_zenoh.board.profile import read_profile  # noqa: PLC0415 - pydantic takes its time
+
+    project = load_project(application_folder())
+    named: dict[str, Path] = {}
+    for given in mappings:
+        path = project.mapping_path(given)
+        name = project.mapping(given).name
+        if name in named:
+            raise UsageError(f"two mappings are named {name!r}. Rename one of the files.")
+        named[name] = path.resolve()
+    if read_profile(profile).model is None and clock is ClockName.VIRTUAL:
+        raise UsageError(
+            f"profile {profile!r} models nothing, so nothing would take any virtual time. Use --clock wall."
+        )
+    return Plan(clock.value, named, requests, seed, profile, out)
+
+
+def run(plan: Plan, *, quiet: bool) -> dict[str, Any]:
+    """Run the experiment and return its object; Ctrl-C keeps what was measured and marks it interrupted."""
+    report = BoardReport()
+    prepare(plan)
+    interrupted = False
+    with ExperimentProgress(plan, quiet=quiet) as progress:
+        try:
+            if plan.clock == "virtual":
+                from reconros_zenoh.experiments.virtual import run_virtual  # noqa: PLC0415 - loads OpenCV
+
+                run_virtual(plan, report, progress.advance)
+            else:
+                from reconros_zenoh.experiments.wall import run_wall  # noqa: PLC0415
+
+                run_wall(plan, report, progress.advance)
+        except (KeyboardInterrupt, SystemExit):
+            interrupted = True
+    return finish(plan, report, interrupted=interrupted)

@@ -1,0 +1,81 @@
+"""The command `reconros`: its verbs and how they end."""
+
+from __future__ import annotations
+
+import importlib
+import logging
+import os
+import signal
+import sys
+
+import typer
+
+from reconros_zenoh.errors import ReconrosError, TransportError, UsageError
+
+_VERBS = {
+    "demo": ("demo", "demo"),
+    "experiment": ("experiment", "app"),
+    "hist": ("hist", "hist"),
+    "up": ("up", "up"),
+    "down": ("up", "down"),
+    "router": ("daemons", "router"),
+    "board": ("daemons", "board"),
+    "client": ("daemons", "client"),
+    "status": ("daemons", "status"),
+    "build": ("build", "build"),
+}
+"""Each verb with its module in this package and its name there, in the order of `reconros --help`."""
+
+
+def main() -> None:
+    """Run the command of this process's arguments and exit.
+
+    Status 0: it did what was asked; 1: an experiment failed or an answer was wrong; 2: what was given cannot be
+    used; 130 and 143: ended by Ctrl-C and SIGTERM.
+    """
+    logging.basicConfig(level=logging.INFO, format="%(levelname)s %(name)s: %(message)s")
+    signal.signal(signal.SIGTERM, _end)
+    # A verb imports what it needs itself: the others' imports would double its start.
+    given = sys.argv[1] if len(sys.argv) > 1 else ""
+    application = _application([given] if given in _VERBS else list(_VERBS))
+    try:
+        application()
+    except KeyboardInterrupt:
+        sys.exit(130)
+    except (UsageError, TransportError) as error:
+        _fail(error, 2)
+    except ReconrosError as error:
+        _fail(error, 1)
+    except BrokenPipeError:
+        # Whoever read our output has had enough; Python must not complain at exit either.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(1)
+
+
+def _application(verbs: list[str]) -> typer.Typer:
+    application = typer.Typer(
+        name="reconros",
+        help="ReconROS without the board: ROS 2 callbacks on emulated CPU+FPGA boards over Zenoh.",
+        no_args_is_help=True,
+        pretty_exceptions_enable=False,
+        add_completion=False,
+    )
+    application.callback()(lambda: None)
+    for verb in verbs:
+        module, name = _VERBS[verb]
+        command = getattr(importlib.import_module(f"reconros_zenoh.cli.{module}"), name)
+        if isinstance(command, typer.Typer):
+            application.add_typer(command, name=verb)
+        else:
+            application.command(verb)(command)
+    return application
+
+
+def _fail(error: ReconrosError, status: int) -> None:
+    print(f"reconros: {error}", file=sys.stderr)
+    sys.exit(status)
+
+
+def _end(*_: object) -> None:
+    """End on SIGTERM as on Ctrl-C: through every `finally`."""
+    sys.exit(128 + signal.SIGTERM)

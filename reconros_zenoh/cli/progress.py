@@ -1,0 +1,53 @@
+"""How far an experiment is: a bar per client on a terminal, lines elsewhere."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Self
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+from reconros_zenoh.experiments.roundtrip import CLIENTS
+
+if TYPE_CHECKING:
+    from reconros_zenoh.experiments.roundtrip import Plan
+
+
+class ExperimentProgress:
+    """Shows the round trips of the mapping that runs; writes to stderr, nothing when quiet."""
+
+    def __init__(self, plan: Plan, *, quiet: bool) -> None:
+        self._plan = plan
+        self._console = Console(stderr=True, quiet=quiet)
+        self._bars = Progress(
+            TextColumn("{task.description}"),
+            BarColumn(),
+            MofNCompleteColumn(),
+            TimeElapsedColumn(),
+            console=self._console,
+            disable=quiet or not self._console.is_terminal,
+        )
+        self._tasks = {client: self._bars.add_task(client, total=plan.requests) for client in CLIENTS}
+        self._left = 0
+        self._mapping = ""
+
+    def __enter__(self) -> Self:
+        self._bars.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._bars.stop()
+
+    def advance(self, mapping: str, client: str) -> None:
+        """Count one round trip of a client under a mapping."""
+        if mapping != self._mapping:
+            self._mapping = mapping
+            self._left = self._plan.requests * len(CLIENTS)
+            for name, task in self._tasks.items():
+                self._bars.reset(task, description=f"{mapping}  {name}")
+            if not self._console.is_terminal:
+                self._console.print(f"{self._plan.clock} time, {mapping}: {self._left} round trips ...")
+        self._bars.advance(self._tasks[client])
+        self._left -= 1
+        if not self._left and not self._console.is_terminal:
+            self._console.print(f"{self._plan.clock} time, {mapping}: done")

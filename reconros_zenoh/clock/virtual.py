@@ -1,0 +1,51 @@
+"""Virtual time: the event loop jumps from event to event."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import simpy
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+
+class VirtualEnvironment(simpy.Environment):
+    """A SimPy environment whose `now` is integer nanoseconds and which takes calls from outside its processes.
+
+    Deterministic: with the same seed the same events happen in the same order, on any machine.
+    """
+
+    def __init__(self, initial_time_ns: int = 0) -> None:
+        super().__init__(initial_time_ns)
+        self.steps = 0
+
+    @property
+    def now(self) -> int:
+        """The present time [ns]."""
+        return self._now  # type: ignore[return-value] # an integer from the start, and only integers are added
+
+    def clock_ns(self) -> int:
+        """Return the time of this very moment [ns]; callable from any thread."""
+        return self.now
+
+    def post(self, function: Callable[..., object], *arguments: object) -> None:
+        """Have `function(*arguments)` called by the event loop at the present time, after what is due already."""
+        self.call_later(0, function, *arguments)
+
+    def call_later(self, delay_ns: int, function: Callable[..., object], *arguments: object) -> None:
+        """Have `function(*arguments)` called by the event loop after `delay_ns`."""
+        timeout = self.timeout(delay_ns)
+        assert timeout.callbacks is not None
+        timeout.callbacks.append(lambda _: function(*arguments))
+
+    def step(self) -> None:
+        """Process the next event."""
+        self.steps += 1
+        super().step()
+
+
+def succeed_once(event: simpy.Event) -> None:
+    """Let the event happen unless it has happened."""
+    if not event.triggered:
+        event.succeed()

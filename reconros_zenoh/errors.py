@@ -1,0 +1,68 @@
+"""Every error this project raises on purpose.
+
+ReconrosError
+├── UsageError             what the user gave cannot be used: the command ends with status 2
+│   └── FileError          the same, with the file and line it stands in
+│       └── BitstreamError a bitstream that is damaged or meant for another slot
+├── TransportError         the network did not do what was asked (no router, port in use, closed)
+├── BadMessageError        a message that is counted and dropped; never ends a process
+├── CallbackError          a callback raised while it ran
+└── ExperimentError        an experiment that could not be completed
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+
+class ReconrosError(Exception):
+    """Base of all errors of this project; `str()` is one or more plain sentences for the user."""
+
+
+class UsageError(ReconrosError):
+    """What the user gave cannot be used; the message says what to do."""
+
+
+class FileError(UsageError):
+    """A file that cannot be used: `path:line: what is wrong. Remedy.`"""
+
+    def __init__(self, path: Path | str, line: int | None, problem: str, remedy: str = "") -> None:
+        self.path = path
+        self.line = line
+        self.problem = problem
+        self.remedy = remedy
+        place = f"{path}:{line}" if line is not None else f"{path}"
+        super().__init__(f"{place}: {problem}" + (f" {remedy}" if remedy else ""))
+
+
+class BitstreamError(FileError):
+    """A bitstream file that is damaged or belongs to another slot or callback."""
+
+
+class TransportError(ReconrosError):
+    """The network did not do what was asked of it."""
+
+
+class BadMessageError(ReconrosError):
+    """A message that cannot be processed.
+
+    `reason` is a short stable word under which the board counts it: one of
+    `no_attachment`, `foreign_domain`, `type_mismatch`, `truncated`, `foreign_encoding`, or a reason of the
+    callback that refused it (`image_size`, `image_encoding`, `number_count`, `leg`).
+    """
+
+    def __init__(self, reason: str, detail: str) -> None:
+        self.reason = reason
+        self.detail = detail
+        super().__init__(f"{reason}: {detail}")
+
+
+class CallbackError(ReconrosError):
+    """A callback raised while it ran."""
+
+
+class ExperimentError(ReconrosError):
+    """An experiment that could not be completed."""

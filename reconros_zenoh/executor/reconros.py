@@ -1,0 +1,80 @@
+"""The ReconROS executor (ReconROS Executor, Section III-B)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from reconros_zenoh.executor.callbacks import CallbackKind, CallbackLists, lowest
+
+if TYPE_CHECKING:
+    from reconros_zenoh.executor.callbacks import CallbackEntry, CallbackList, Dispatch
+
+_WITH_POSITION = (CallbackKind.SUB, CallbackKind.SRV, CallbackKind.CLT)
+
+
+class OffsetVector:
+    """One worker's `Position` in each list but the timers': the callback it served last.
+
+    A search starts behind `Position`. When it meets the end of the list, `Position` wraps to the beginning and
+    the worker goes on to the next list, so a subscriber that is always ready cannot starve the service servers
+    behind it: between two services of it every other list is looked at once.
+    """
+
+    def __init__(self, lists: CallbackLists) -> None:
+        # The paper initialises Position with the length of the list, so that the first search starts over.
+        self._position = {kind: len(lists[kind]) for kind in _WITH_POSITION}
+
+    def search(self, kind: CallbackKind, ready: int) -> int | None:
+        """Return the first set bit behind `Position` and move there; wrap and return None at the end."""
+        behind = ready >> (self._position[kind] + 1)
+        if not behind:
+            self._position[kind] = -1
+            return None
+        index = self._position[kind] + 1 + lowest(behind)
+        self._position[kind] = index
+        return index
+
+
+class ReconrosExecutor:
+    """Hands ready callbacks to software and hardware workers, whose number it need not know.
+
+    A worker asks with `select`, runs what it got to completion, and says so with `finish`. Timers come first, in
+    the order of registration; then subscribers, service servers and service clients, each behind the worker's
+    own OffsetVector. No callback runs twice at once and none runs where its ResourceMask has no field.
+    """
+
+    def __init__(self) -> None:
+        self.callbacks = CallbackLists()
+        self._offsets: dict[object, OffsetVector] = {}
+
+    def add(self, entry: CallbackEntry) -> None:
+        """Register a callback, before any worker asks; raise ValueError when its name is taken."""
+        self.callbacks.add(entry)
+
+    def refresh(self, entry: CallbackEntry) -> None:
+        """Note that an event of the entry has come or gone."""
+        self.callbacks.refresh(entry)
+
+    def select(self, worker: object, resource: int) -> Dispatch | None:
+        """Return the callback that this worker of `resource` must run now, or None when none is ready."""
+        timers = self.callbacks[CallbackKind.TMR].ready(resource)
+        if timers:
+            return self._take(self.callbacks[CallbackKind.TMR], lowest(timers), resource)
+        offsets = self._offsets.get(worker)
+        if offsets is None:
+            offsets = self._offsets[worker] = OffsetVector(self.callbacks)
+        # Twice: the first round may only have wrapped every Position.
+        for _ in range(2):
+            for kind in _WITH_POSITION:
+                callbacks = self.callbacks[kind]
+                index = offsets.search(kind, callbacks.ready(resource))
+                if index is not None:
+                    return self._take(callbacks, index, resource)
+        return None
+
+    def finish(self, dispatch: Dispatch) -> None:
+        """Note that the dispatched callback has run to completion."""
+        self.callbacks.finish(dispatch)
+
+    def _take(self, callbacks: CallbackList, index: int, resource: int) -> Dispatch:
+        return self.callbacks.take(callbacks[index], resource)

@@ -1,0 +1,130 @@
+"""The round-trip experiment (ReconROS Executor, Section V-C): what is run, and what comes out."""
+
+from __future__ import annotations
+
+import json
+import platform
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from importlib.metadata import version
+from importlib.resources import files
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from reconros_zenoh.errors import UsageError
+from reconros_zenoh.measure.compare import experiment_tables
+from reconros_zenoh.measure.record import read_record
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from reconros_zenoh.measure.record import Record
+
+CLIENTS = ("inverse", "mnist", "sobel", "sort", "hash")
+"""In the order in which the paper's Fig. 6 shows them."""
+
+Clock = Literal["wall", "virtual"]
+
+
+def application_folder() -> Path:
+    """Return the folder of the project that the experiment runs."""
+    return Path(str(files("reconros_zenoh.applications.roundtrip")))
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """One run of the experiment: the mapping files by name, all else alike for each of them."""
+
+    clock: Clock
+    mappings: Mapping[str, Path]
+    requests: int
+    seed: int
+    profile: str
+    out: Path
+
+    @property
+    def folder(self) -> Path:
+        """Where this clock's records and experiment.json go."""
+        return self.out / self.clock
+
+    def record_path(self, mapping: str, client: str) -> Path:
+        """Where the round trips of one client go."""
+        return self.folder / mapping / f"{client}.csv"
+
+
+@dataclass(slots=True)
+class BoardReport:
+    """What the boards said of themselves at the end of each mapping (`board.control.status`), by mapping."""
+
+    statuses: dict[str, Mapping[str, Any]] = field(default_factory=dict)
+
+    def host(self) -> dict[str, Any]:
+        """Return the overruns of all mappings together and the worst lag."""
+        hosts = [status["host"] for status in self.statuses.values()]
+        return {
+            "overruns": sum(host["overruns"] for host in hosts),
+            **{
+                key: max((host[key] for host in hosts if host[key] is not None), default=None)
+                for key in ("lag_p50_us", "lag_p99_us")
+            },
+        }
+
+
+def finish(plan: Plan, report: BoardReport, *, interrupted: bool) -> dict[str, Any]:
+    """Return the experiment's object from what is recorded, and write it as experiment.json beside the records."""
+    experiment = {
+        "experiment": "roundtrip",
+        "clock": plan.clock,
+        "requests": plan.requests,
+        "seed": plan.seed,
+        **experiment_tables(_records(plan)),
+        "host": report.host(),
+        "spans": {mapping: status["spans_ms"] for mapping, status in report.statuses.items()},
+        "rejected": {mapping: status["rejected"] for mapping, status in report.statuses.items()},
+        "interrupted": interrupted,
+        "profile": plan.profile,
+        "version": version("reconros-zenoh"),
+        "date": datetime.now(UTC).isoformat(timespec="seconds"),
+        "machine": f"{platform.system()} {platform.machine()}, Python {platform.python_version()}",
+    }
+    path = plan.folder / "experiment.json"
+    try:
+        path.write_text(json.dumps(experiment, indent=1), encoding="utf-8")
+    except OSError as error:
+        raise UsageError(f"{path} cannot be written ({error.strerror}). Choose another --out.") from None
+    return experiment
+
+
+def all_right(experiment: Mapping[str, Any]) -> bool:
+    """Tell whether every request was made, answered and answered rightly."""
+    return not experiment["interrupted"] and all(
+        cell["n"] == experiment["requests"] and not cell["lost"] and not cell["wrong"]
+        for clients in experiment["mappings"].values()
+        for cell in clients.values()
+    )
+
+
+def prepare(plan: Plan) -> None:
+    """Make the folders of the run and remove what an earlier run of it left; raise UsageError where that fails."""
+    try:
+        for mapping in plan.mappings:
+            (plan.folder / mapping).mkdir(parents=True, exist_ok=True)
+            for client in CLIENTS:
+                plan.record_path(mapping, client).unlink(missing_ok=True)
+        (plan.folder / "experiment.json").unlink(missing_ok=True)
+    except OSError as error:
+        raise UsageError(
+            f"{plan.folder} cannot be written ({error.strerror}). Choose another folder with --out."
+        ) from None
+
+
+def _records(plan: Plan) -> dict[str, dict[str, Record]]:
+    return {
+        mapping: {
+            client: read_record(path)
+            for client in CLIENTS
+            if (path := plan.record_path(mapping, client)).exists()
+        }
+        for mapping in plan.mappings
+        if any(plan.record_path(mapping, client).exists() for client in CLIENTS)
+    }

@@ -1,0 +1,120 @@
+"""Our round trips beside those of the real board, and the mappings beside each other."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from rich.box import SIMPLE_HEAD
+from rich.table import Table
+from rich.text import Text
+
+from reconros_zenoh.measure.reference.zynq7100 import reference_cells
+from reconros_zenoh.measure.statistics import format_error, format_ms, format_speedup, summarise
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from rich.console import Console
+
+    from reconros_zenoh.measure.record import Record
+
+LOGGED_MODULO_MS = 1000.0
+"""The paper's clients logged the nanosecond part of each difference only, so the reference is modulo 1 s."""
+
+GOOD_ERROR = 0.10
+"""A median this close to the real board's counts as met; the board repeats its own within 6 %."""
+
+FAIR_ERROR = 0.25
+
+MODULO_NOTE = (
+    "For the error against the real board our times are taken modulo 1 s, as the paper's clients logged "
+    "theirs. All other figures are whole round-trip times."
+)
+
+
+def experiment_tables(records: Mapping[str, Mapping[str, Record]]) -> dict[str, Any]:
+    """Return `mappings`, `speedup_of_means` and `speedup_of_medians` for `records[mapping][client]`.
+
+    `mappings.<mapping>.<client>` is the summary with `reference_median_ms` and `median_error` (ours over the
+    reference, less one; our times modulo 1 s as the paper's clients logged theirs), None where the real board
+    was not measured. A speedup is all_software over the mapping, None where either has no answer; the two
+    tables are empty if all_software was not run.
+    """
+    mappings = {
+        mapping: {client: _cell(mapping, client, record) for client, record in clients.items()}
+        for mapping, clients in records.items()
+    }
+    return {
+        "mappings": mappings,
+        "speedup_of_means": _speedups(mappings, "mean_ms"),
+        "speedup_of_medians": _speedups(mappings, "median_ms"),
+    }
+
+
+def print_tables(console: Console, experiment: Mapping[str, Any]) -> None:
+    """Print one row per mapping and client: how many answers, how fast, how far from the real board."""
+    title = Text(f"{experiment['experiment']}, {experiment['clock']} clock", style="bold")
+    # Narrow enough for 80 columns with the mappings of the paper; longer names are folded, never cut.
+    table = Table(title=title, title_justify="left", box=SIMPLE_HEAD, padding=0, show_edge=False)
+    table.add_column("mapping", overflow="fold")
+    table.add_column("client", overflow="fold")
+    for column in ("n", "lost", "wrong", "median", "p95", "p99", "board", "error", "speedup"):
+        table.add_column(column, justify="right", no_wrap=True)
+    for mapping, clients in experiment["mappings"].items():
+        for client, cell in clients.items():
+            speedup = experiment["speedup_of_medians"].get(mapping, {}).get(client)
+            table.add_row(
+                Text(mapping),
+                Text(client),
+                str(cell["n"]),
+                Text(str(cell["lost"]), style="red" if cell["lost"] else ""),
+                Text(str(cell["wrong"]), style="red" if cell["wrong"] else ""),
+                *(format_ms(cell[key]) for key in ("median_ms", "p95_ms", "p99_ms", "reference_median_ms")),
+                Text(format_error(cell["median_error"]), style=_error_style(cell["median_error"])),
+                format_speedup(speedup),
+            )
+        table.add_section()
+    console.print(table)
+    console.print(
+        "Times in ms. board: median on the real Zynq Z7100. error: our median against it. "
+        f"speedup: median of all_software over this one. {MODULO_NOTE}",
+        style="dim",
+        highlight=False,
+    )
+
+
+def _cell(mapping: str, client: str, record: Record) -> dict[str, float | int | None]:
+    reference = reference_cells().get(mapping, {}).get(client)
+    cell = summarise(record.values_ms, record.lost, record.wrong)
+    cell["reference_median_ms"] = reference.median_ms if reference else None
+    cell["median_error"] = None
+    if reference and record.values_ms.size:
+        logged_ms = np.median(record.values_ms % LOGGED_MODULO_MS)
+        cell["median_error"] = float(logged_ms / reference.median_ms - 1)
+    return cell
+
+
+def _speedups(
+    mappings: Mapping[str, Mapping[str, dict[str, Any]]], figure: str
+) -> dict[str, dict[str, float | None]]:
+    software = mappings.get("all_software", {})
+    return {
+        mapping: {
+            client: software[client][figure] / cell[figure]
+            if software[client][figure] and cell[figure]
+            else None
+            for client, cell in clients.items()
+            if client in software
+        }
+        for mapping, clients in mappings.items()
+        if software and mapping != "all_software"
+    }
+
+
+def _error_style(error: float | None) -> str:
+    if error is None:
+        return ""
+    if abs(error) <= GOOD_ERROR:
+        return "green"
+    return "yellow" if abs(error) <= FAIR_ERROR else "red"

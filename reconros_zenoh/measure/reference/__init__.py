@@ -1,0 +1,1 @@
+"""Measurements of the real boards, as summaries with their source."""

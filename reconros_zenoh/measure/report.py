@@ -1,0 +1,282 @@
+"""The report of an experiment: one HTML file that needs nothing else."""
+
+from __future__ import annotations
+
+from html import escape
+from typing import TYPE_CHECKING, Any
+
+from reconros_zenoh.errors import UsageError
+from reconros_zenoh.measure.compare import FAIR_ERROR, GOOD_ERROR, MODULO_NOTE
+from reconros_zenoh.measure.findings import findings
+from reconros_zenoh.measure.plots import grid_figure, inline_svg, spans_figure
+from reconros_zenoh.measure.reference.zynq7100 import (
+    PRINTED_SPEEDUPS_OF_MEANS,
+    SWAPPED_COLUMNS,
+    reference_cells,
+    reference_notes,
+)
+from reconros_zenoh.measure.statistics import format_error, format_ms, format_speedup
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping, Sequence
+    from pathlib import Path
+
+    from reconros_zenoh.measure.record import Record
+
+Cell = str | tuple[str, str]
+
+_CLOCKS = {
+    "virtual": "Virtual time: the board is simulated event by event; the same seed gives the same figures.",
+    "wall": "Wall time: board and clients are processes of their own that talk over a network in real time.",
+}
+
+_STYLE = """
+:root { color-scheme: light dark; --paper: #ffffff; --ink: #24292f; --grey: #8b949e; --line: #d8dee4;
+  --soft: #f6f8fa; --good: #1a7f37; --fair: #9a6700; --bad: #cf222e; }
+@media (prefers-color-scheme: dark) { :root { --paper: #0f1318; --ink: #e6edf3; --line: #30363d;
+  --soft: #171c23; --good: #3fb950; --fair: #d29922; --bad: #ff7b72; } }
+body { margin: 0 auto; padding: 1.5rem; max-width: 75rem; background: var(--paper); color: var(--ink);
+  font: 16px/1.55 system-ui, sans-serif; }
+h1 { line-height: 1.2; } h2 { margin-top: 2.5rem; border-bottom: 1px solid var(--line); }
+p, li, figcaption { max-width: 52rem; }
+figure { margin: 1rem 0; } figcaption, .small { font-size: 0.87rem; opacity: 0.85; }
+.wide { overflow-x: auto; } .wide svg { display: block; width: 100%; min-width: 56rem; height: auto; }
+table { border-collapse: collapse; font-size: 0.9rem; font-variant-numeric: tabular-nums; }
+th, td { padding: 0.25rem 0.7rem; border-bottom: 1px solid var(--line); text-align: right; }
+th { background: var(--soft); font-weight: 600; }
+th:nth-child(-n+2), td:nth-child(-n+2) { text-align: left; }
+.good { color: var(--good); } .fair { color: var(--fair); } .bad { color: var(--bad); }
+.warning { border-left: 4px solid var(--bad); background: var(--soft); padding: 0.6rem 1rem; }
+"""
+
+
+def write_report(
+    path: Path,
+    experiments: Sequence[Mapping[str, Any]],
+    records: Sequence[Mapping[str, Mapping[str, Record]]],
+) -> None:
+    """Write one self-contained HTML file about the experiments, `records[i]` belonging to `experiments[i]`.
+
+    Experiments and records are as `load_run` returns them, one per clock. The file is complete or not there:
+    it replaces an older one at the end. Raises UsageError if it cannot be written.
+    """
+    page = _page(experiments, records)
+    partial = path.with_name(path.name + ".partial")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        partial.write_text(page, encoding="utf-8")
+        partial.replace(path)
+    except OSError as error:
+        raise UsageError(
+            f"{path}: the report cannot be written: {error.strerror}. Choose a folder that you may write to."
+        ) from error
+
+
+def _page(
+    experiments: Sequence[Mapping[str, Any]], records: Sequence[Mapping[str, Mapping[str, Record]]]
+) -> str:
+    title = "Round-trip times in software and in hardware"
+    parts = [f"<h1>{escape(title)}</h1>", _introduction(experiments), "<h2>In short</h2>"]
+    parts += [_summary(experiment) for experiment in experiments]
+    for experiment, its_records in zip(experiments, records, strict=True):
+        parts += _section(experiment, its_records)
+    notes = "".join(f"<li>{escape(note)}</li>" for note in reference_notes())
+    parts += [f"<h2>The real board's data</h2><ul>{notes}<li>{escape(SWAPPED_COLUMNS)}</li></ul>"]
+    parts += ["<h2>How it was made</h2>", *(_origin(experiment) for experiment in experiments)]
+    return (
+        '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">'
+        f"<title>{escape(title)}</title><style>{_STYLE}</style></head>\n<body>\n"
+        + "\n".join(parts)
+        + "\n</body></html>\n"
+    )
+
+
+def _introduction(experiments: Sequence[Mapping[str, Any]]) -> str:
+    clients = dict.fromkeys(client for e in experiments for row in e["mappings"].values() for client in row)
+    text = (
+        f"Client programs ({', '.join(clients)}) send requests to an emulated board that has processor cores "
+        "and an FPGA. Each waits for the answer before it sends the next request and notes how long that "
+        "took: the round-trip time. A mapping says which of the board's callbacks run in software on the "
+        "cores and which in hardware, in the reconfigurable slots of the FPGA. The authors of the ReconROS "
+        "executor measured three mappings on a real board, a Zynq Z7100; where one of them was run, their "
+        "figures stand beside ours."
+    )
+    if "hash" in clients:
+        text += (
+            " The hash client sends nothing: a timer on the board starts its callback every 250 ms, and the "
+            "figure is the time between two messages."
+        )
+    return f"<p>{escape(text)}</p>"
+
+
+def _summary(experiment: Mapping[str, Any]) -> str:
+    items = "".join(
+        f'<li class="{"bad" * finding.warning}">'
+        f"<b>{escape(finding.subject)}</b>: {escape(finding.sentence)}</li>"
+        for finding in findings(experiment)
+    )
+    return f"<h3>{escape(_name(experiment))}</h3><ul>{items}</ul>"
+
+
+def _section(experiment: Mapping[str, Any], records: Mapping[str, Mapping[str, Record]]) -> list[str]:
+    parts = [f"<h2>{escape(_name(experiment))}</h2>"]
+    if clock := _CLOCKS.get(experiment["clock"]):
+        parts.append(f"<p>{clock}</p>")
+    if experiment["clock"] == "wall" and (overruns := experiment["host"]["overruns"]):
+        parts.append(
+            f"<p class=\"warning\"><b>These figures are the host's rather than the board's.</b> "
+            f"{overruns} times the computer that ran this needed longer for a computation than the board is "
+            "modelled to need, so the answer came late. Trust the virtual clock, or run again on a faster or "
+            "less busy computer.</p>"
+        )
+    parts += [
+        "<h3>How often each round-trip time occurred</h3>",
+        _figure(
+            inline_svg(grid_figure(records)),
+            "Round-trip times per client and mapping",
+            "Coloured: this run. Dashed: its mean. Grey: the real board, where it was measured (modulo 1 s). "
+            "All panels of a client share one time axis, so mappings can be compared; it is cut where the "
+            "tails get thin, and the share outside is written below. After ReconROS Executor, Fig. 6.",
+        ),
+        "<h3>Medians, and the real board's</h3>",
+        _medians(experiment),
+        f'<p class="small">Times in ms. The error is our median against the real board\'s. {MODULO_NOTE}</p>',
+        "<h3>Speedups</h3>",
+        _speedups(experiment),
+    ]
+    if spans := experiment.get("spans"):
+        parts += [
+            "<h3>Where the time goes</h3>",
+            _figure(
+                inline_svg(spans_figure(spans)),
+                "Mean time per stage, client and mapping",
+                "The mean time of each stage on a message's way, from the request to the answer. The stages "
+                "are stacked; the number at the end is their sum.",
+            ),
+            "<details><summary>The same as a table</summary>",
+            _stages(spans),
+            "</details>",
+        ]
+    return parts
+
+
+def _medians(experiment: Mapping[str, Any]) -> str:
+    rows: list[list[Cell]] = []
+    for mapping, client, cell in _by_client(experiment["mappings"]):
+        rows.append(
+            [
+                client,
+                mapping,
+                str(cell["n"]),
+                (str(cell["lost"]), "bad" if cell["lost"] else ""),
+                (str(cell["wrong"]), "bad" if cell["wrong"] else ""),
+                *(format_ms(cell[key]) for key in ("median_ms", "reference_median_ms")),
+                (format_error(cell["median_error"]), _error_class(cell["median_error"])),
+                *(
+                    format_ms(cell[key])
+                    for key in ("p5_ms", "p25_ms", "p75_ms", "p95_ms", "p99_ms", "max_ms", "mean_ms")
+                ),
+            ]
+        )
+    head = (
+        "client, mapping, answers, lost, wrong, median, real board, error, p5, p25, p75, p95, p99, max, mean"
+    )
+    return _table(head.split(", "), rows)
+
+
+def _speedups(experiment: Mapping[str, Any]) -> str:
+    if not experiment["speedup_of_means"]:
+        return "<p>all_software was not run, so there is nothing to compare the mappings with.</p>"
+    reference = reference_cells()
+    rows: list[list[Cell]] = []
+    for mapping, client, mean in _by_client(experiment["speedup_of_means"]):
+        median = experiment["speedup_of_medians"].get(mapping, {}).get(client)
+        software, board = reference["all_software"].get(client), reference.get(mapping, {}).get(client)
+        rows.append(
+            [
+                client,
+                mapping,
+                format_speedup(median),
+                format_speedup(software.median_ms / board.median_ms if software and board else None),
+                format_speedup(mean),
+                format_speedup(software.mean_ms / board.mean_ms if software and board else None),
+                format_speedup(PRINTED_SPEEDUPS_OF_MEANS.get(mapping, {}).get(client)),
+            ]
+        )
+    head = [
+        "client",
+        "mapping",
+        "medians",
+        "medians, real board",
+        "means",
+        "means, real board",
+        "means, as printed",
+    ]
+    return (
+        _table(head, rows)
+        + '<p class="small">all_software over the mapping: above 1 the mapping is faster. The means hang on '
+        f"few values of the tail; compare the medians. {escape(SWAPPED_COLUMNS)}</p>"
+    )
+
+
+def _stages(spans: Mapping[str, Mapping[str, Mapping[str, float]]]) -> str:
+    cells = _by_client(spans)
+    stages = list(dict.fromkeys(stage for _, _, cell in cells for stage in cell))
+    rows: list[list[Cell]] = [
+        [client, mapping, *(format_ms(cell.get(stage)) for stage in stages)]
+        for mapping, client, cell in cells
+    ]
+    return _table(["client", "mapping", *stages], rows)
+
+
+def _origin(experiment: Mapping[str, Any]) -> str:
+    shown = {
+        key: experiment[key]
+        for key in ("command", "profile", "clock", "requests", "seed", "date")
+        if key in experiment
+    }
+    shown |= {f"version of {name}": version for name, version in experiment.get("versions", {}).items()}
+    shown |= {f"host: {key}": value for key, value in experiment["host"].items()}
+    rows = "".join(
+        f"<tr><td>{escape(key)}</td><td>{escape(str(value))}</td></tr>" for key, value in shown.items()
+    )
+    return f'<h3>{escape(_name(experiment))}</h3><div class="wide"><table>{rows}</table></div>'
+
+
+def _name(experiment: Mapping[str, Any]) -> str:
+    return f"{experiment['experiment']}, {experiment['clock']} clock"
+
+
+def _by_client(table: Mapping[str, Mapping[str, Any]]) -> list[tuple[str, str, Any]]:
+    """Return the cells as (mapping, client, cell), with a client's mappings beside each other."""
+    clients = dict.fromkeys(client for row in table.values() for client in row)
+    return [
+        (mapping, client, row[client])
+        for client in clients
+        for mapping, row in table.items()
+        if client in row
+    ]
+
+
+def _error_class(error: float | None) -> str:
+    if error is None:
+        return ""
+    if abs(error) <= GOOD_ERROR:
+        return "good"
+    return "fair" if abs(error) <= FAIR_ERROR else "bad"
+
+
+def _figure(svg: str, label: str, caption: str) -> str:
+    drawing = svg.replace("<svg ", f'<svg role="img" aria-label="{escape(label)}" ', 1)
+    return f'<figure><div class="wide">{drawing}</div><figcaption>{escape(caption)}</figcaption></figure>'
+
+
+def _table(head: Iterable[str], rows: Iterable[Sequence[Cell]]) -> str:
+    lines = ["<tr>" + "".join(f"<th>{escape(text)}</th>" for text in head) + "</tr>"]
+    for row in rows:
+        cells = [(cell, "") if isinstance(cell, str) else cell for cell in row]
+        lines.append(
+            "<tr>" + "".join(f'<td class="{style}">{escape(text)}</td>' for text, style in cells) + "</tr>"
+        )
+    return '<div class="wide"><table>' + "\n".join(lines) + "</table></div>"

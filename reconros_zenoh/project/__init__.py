@@ -1,0 +1,1 @@
+"""The files of a ReconROS project: `build.cfg`, interfaces and mappings."""

@@ -1,0 +1,73 @@
+"""Service clients."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from reconros_zenoh.errors import BadMessageError, TransportError
+from reconros_zenoh.rmw.endpoint import Endpoint
+from reconros_zenoh.ros.graph import EndpointKind
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from reconros_zenoh.rmw.node import Node
+    from reconros_zenoh.ros.qos import QosProfile
+    from reconros_zenoh.ros.types import ServiceType
+    from reconros_zenoh.transport.base import Reply
+
+
+class Client(Endpoint):
+    """Calls one service."""
+
+    def __init__(
+        self,
+        node: Node,
+        service_type: ServiceType,
+        name: str,
+        qos: QosProfile,
+        on_matching: Callable[[bool], None] | None,
+    ) -> None:
+        super().__init__(node, EndpointKind.CLIENT, name, service_type, qos)
+        self.service_type = service_type
+        self._querier = self.context.transport.request(self.key, on_matching)
+        self.announce()
+
+    def call(
+        self,
+        request: object,
+        on_response: Callable[[Any | BadMessageError | TransportError], None],
+        timeout_ns: int,
+    ) -> None:
+        """Call the service; `on_response` gets the response once, on a thread of the transport.
+
+        It gets a TransportError when the server refused or nobody answered within `timeout_ns`, and a
+        BadMessageError when the response cannot be decoded.
+        """
+        answered = False
+
+        def on_reply(reply: Reply | None) -> None:
+            nonlocal answered
+            if answered:
+                return
+            answered = True
+            on_response(self._result(reply))
+
+        parts = self.service_type.request.encode(request)
+        self._querier.get(parts, self.next_attachment(), on_reply, timeout_ns)
+
+    def close(self) -> None:
+        """Withdraw the client; a call that still waits is not heard of any more. Idempotent."""
+        self.withdraw()
+        self._querier.close()
+
+    def _result(self, reply: Reply | None) -> Any | BadMessageError | TransportError:
+        if reply is None:
+            return TransportError(f"no answer from service {self.name}")
+        if reply.payload is None:
+            return TransportError(f"service {self.name} refused: {reply.error}")
+        try:
+            return self.service_type.response.decode(reply.payload)
+        except BadMessageError as error:
+            self.context.rejections.add(self.key, None, error)
+            return error

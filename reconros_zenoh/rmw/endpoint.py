@@ -1,0 +1,55 @@
+"""What every endpoint of a node has: a key, a graph token, a gid, and numbered messages."""
+
+from __future__ import annotations
+
+import itertools
+from typing import TYPE_CHECKING
+
+from reconros_zenoh.ros.attachment import Attachment
+from reconros_zenoh.ros.graph import EndpointToken, gid
+from reconros_zenoh.ros.names import data_key, resolve
+
+if TYPE_CHECKING:
+    from reconros_zenoh.rmw.node import Node
+    from reconros_zenoh.ros.graph import EndpointKind
+    from reconros_zenoh.ros.qos import QosProfile
+    from reconros_zenoh.ros.types import MessageType, ServiceType
+
+
+class Endpoint:
+    """One end of a topic or service, announced in the ROS graph until it is closed."""
+
+    def __init__(
+        self, node: Node, kind: EndpointKind, name: str, interface: MessageType | ServiceType, qos: QosProfile
+    ) -> None:
+        context = node.context
+        self.context = context
+        self.name = resolve(name, node.namespace, node.name)
+        self.key = data_key(context.domain, self.name, interface.dds_name, interface.type_hash)
+        self._token_key = EndpointToken(
+            context.domain,
+            context.transport.session_id,
+            node.node_id,
+            context.next_id(),
+            kind,
+            node.namespace,
+            node.name,
+            self.name,
+            interface.dds_name,
+            interface.type_hash,
+            qos,
+        ).format()
+        self._gid = gid(self._token_key)
+        self._sequence_numbers = itertools.count(1)
+
+    def announce(self) -> None:
+        """Make the endpoint visible in the graph, once it works."""
+        self._token = self.context.transport.declare_token(self._token_key)
+
+    def withdraw(self) -> None:
+        """Take the endpoint out of the graph."""
+        self._token.close()
+
+    def next_attachment(self) -> bytes:
+        """Return the attachment of the endpoint's next message, stamped now."""
+        return Attachment(next(self._sequence_numbers), self.context.clock_ns(), self._gid).encode()

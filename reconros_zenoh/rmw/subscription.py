@@ -1,0 +1,80 @@
+"""Subscriptions."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from reconros_zenoh.errors import BadMessageError
+from reconros_zenoh.rmw.endpoint import Endpoint
+from reconros_zenoh.rmw.received import Received
+from reconros_zenoh.ros.attachment import Attachment
+from reconros_zenoh.ros.graph import EndpointKind
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from reconros_zenoh.rmw.node import Node
+    from reconros_zenoh.ros.qos import QosProfile
+    from reconros_zenoh.ros.types import MessageType
+    from reconros_zenoh.transport.base import Sample
+
+
+class Subscription(Endpoint):
+    """Hands the messages of one topic to `sink`, decoded, on a thread of the transport.
+
+    `check`, when given, raises BadMessageError for a message that its receiver cannot use. Bad messages are
+    counted and logged by the context; `sink` never sees them. The key expression leaves domain and type hash open,
+    so that a publisher in another domain or with another version of the type is noticed rather than never heard.
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        message_type: MessageType,
+        topic: str,
+        qos: QosProfile,
+        sink: Callable[[Received], None],
+        check: Callable[[Any], None] | None,
+    ) -> None:
+        super().__init__(node, EndpointKind.SUBSCRIPTION, topic, message_type, qos)
+        self._type = message_type
+        self._sink = sink
+        self._check = check
+        middle = self.key.split("/")[1:-1]
+        self._subscription = self.context.transport.subscribe(
+            "/".join(("*", *middle, "*")), self._on_sample, qos
+        )
+        self.announce()
+
+    def close(self) -> None:
+        """End the subscription; `sink` is not called any more. Idempotent."""
+        self.withdraw()
+        self._subscription.close()
+
+    def _on_sample(self, sample: Sample) -> None:
+        sender = None
+        try:
+            if sample.key != self.key:
+                raise _foreign(sample.key, self.key)
+            attachment = Attachment.decode(sample.attachment)
+            sender = attachment.gid
+            payload = sample.read()
+            message = self._type.decode(payload)
+            if self._check is not None:
+                self._check(message)
+        except BadMessageError as error:
+            self.context.rejections.add(sample.key, sender.hex() if sender else None, error)
+            return
+        transit_ns = self.context.clock_ns() - attachment.source_timestamp_ns
+        self._sink(Received(message, len(payload), transit_ns))
+
+
+def _foreign(key: str, own: str) -> BadMessageError:
+    domain, own_domain = key.split("/", 1)[0], own.split("/", 1)[0]
+    if domain != own_domain:
+        return BadMessageError(
+            "foreign_domain", f"it was sent in domain {domain}, this is domain {own_domain}"
+        )
+    return BadMessageError(
+        "type_mismatch", f"the sender's type has hash {key.rsplit('/', 1)[1]}, ours {own.rsplit('/', 1)[1]}"
+    )

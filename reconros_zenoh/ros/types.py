@@ -1,0 +1,269 @@
+"""Message and service types: their names, hashes and CDR serialisation, on top of rosbags."""
+
+from __future__ import annotations
+
+import difflib
+import struct
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from rosbags.interfaces import Nodetype
+from rosbags.serde import SerdeError
+from rosbags.typesys import Stores, TypesysError, get_typestore
+
+from reconros_zenoh.errors import BadMessageError, FileError, UsageError
+from reconros_zenoh.ros.definitions import char_as_uint8, message_definition, service_definitions
+from reconros_zenoh.ros.names import dds_type_name
+
+if TYPE_CHECKING:
+    from collections.abc import Collection
+
+    from rosbags.interfaces.typing import Fielddefs, Typesdict
+    from rosbags.typesys.store import Typestore
+
+_ENCAPSULATION_LENGTH = 4
+_COUNT = struct.Struct("<I")
+_ENCAPSULATIONS = {  # DDS-XTypes 1.3, Table 60
+    0x0000: "CDR big endian",
+    0x0001: "CDR little endian",
+    0x0002: "PL_CDR big endian",
+    0x0003: "PL_CDR little endian",
+    0x0006: "CDR2 big endian",
+    0x0007: "CDR2 little endian",
+    0x0008: "D_CDR2 big endian",
+    0x0009: "D_CDR2 little endian",
+    0x000A: "PL_CDR2 big endian",
+    0x000B: "PL_CDR2 little endian",
+}
+_LITTLE_ENDIAN = 0x0001
+
+_SPLIT_FROM = 65536
+"""Arrays from this size [byte] on are not copied; below, a copy takes less time than a second part."""
+
+_STD_SRVS = {
+    "std_srvs/srv/Empty": "---",
+    "std_srvs/srv/SetBool": "bool data\n---\nbool success\nstring message",
+    "std_srvs/srv/Trigger": "---\nbool success\nstring message",
+}
+
+
+class MessageType:
+    """A message type that can be sent and received.
+
+    `name` is `package/msg/Type`, `dds_name` and `type_hash` are its name and RIHS01 hash on the wire, `cls`
+    is the dataclass of its messages. Comes from a TypeRegistry; may be used from any thread.
+    """
+
+    def __init__(self, store: Typestore, name: str) -> None:
+        definition = store.get_msgdef(name)
+        self.name = name
+        self.dds_name = dds_type_name(name)
+        self.type_hash = store.hash_rihs01(name)
+        self.cls: type[Any] = definition.cls
+        self._store = store
+        self._deserialize = definition.deserialize_cdr_le
+        self._fields_before = [field for field, _ in definition.fields[:-1]]
+        self._last_array = _last_array(definition.fields)
+
+    def __repr__(self) -> str:
+        return f"MessageType({self.name!r})"
+
+    def encode(self, message: Any) -> tuple[bytes | memoryview, ...]:
+        """Return the parts that joined are `message` as XCDR1 little endian, with its encapsulation.
+
+        A big array in the last field is not copied: the last part is a view of it, so it must not change
+        before the parts are joined. Raises UsageError for a message whose fields do not have their types.
+        """
+        try:
+            if self._last_array is not None:
+                field, empty = self._last_array
+                array = getattr(message, field)
+                if _can_be_viewed(array, empty.dtype):
+                    others = [getattr(message, other) for other in self._fields_before]
+                    # The last thing in the header is the count of the last array, 0 so far.
+                    header = self._serialize(self.cls(*others, empty))[: -_COUNT.size]
+                    return header + _COUNT.pack(len(array)), memoryview(array).cast("B").toreadonly()
+            return (self._serialize(message),)
+        except (AttributeError, TypeError, ValueError, SerdeError, struct.error) as error:
+            raise UsageError(
+                f"A message of type {self.name} cannot be serialised: {error}. Give every field a value of "
+                "its type, and arrays of numbers as one-dimensional numpy arrays of the dtype of the field."
+            ) from error
+
+    def decode(self, payload: bytes | memoryview) -> Any:
+        """Return the message that `payload` encodes; its arrays of numbers are views of `payload`.
+
+        Raises BadMessageError `truncated` when the bytes end too early or too late, or a string or array
+        in them does, and `foreign_encoding` for another encapsulation than CDR little endian and for
+        strings that are not UTF-8.
+        """
+        view = memoryview(payload)
+        if len(view) < _ENCAPSULATION_LENGTH:
+            raise BadMessageError("truncated", f"{self.name}: {len(view)} bytes hold no encapsulation header")
+        encapsulation = int.from_bytes(view[:2], "big")
+        if encapsulation != _LITTLE_ENDIAN:
+            kind = _ENCAPSULATIONS.get(encapsulation, "unknown")
+            raise BadMessageError(
+                "foreign_encoding",
+                f"{self.name}: encapsulation {encapsulation:04x} ({kind}), not 0001 (CDR little endian)",
+            )
+        body = view[_ENCAPSULATION_LENGTH:]
+        try:
+            message, end = self._deserialize(body, 0, self.cls, self._store)
+        except UnicodeDecodeError as error:
+            raise BadMessageError(
+                "foreign_encoding", f"{self.name}: a string is not UTF-8: {error}"
+            ) from error
+        except (SerdeError, ValueError, struct.error) as error:
+            raise BadMessageError("truncated", f"{self.name}, {len(view)} bytes: {error}") from error
+        # Some DDS implementations fill the last word of a payload.
+        if len(body) > end + -end % 4:
+            raise BadMessageError("truncated", f"{self.name}: {len(body) - end} bytes follow the message")
+        return message
+
+    def _serialize(self, message: Any) -> bytes:
+        return bytes(self._store.serialize_cdr(message, self.name, little_endian=True))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ServiceType:
+    """A service type: `name` is `package/srv/Type`, `dds_name` and `type_hash` stand on the wire."""
+
+    name: str
+    dds_name: str
+    type_hash: str
+    request: MessageType
+    response: MessageType
+
+
+class TypeRegistry:
+    """The message types of ROS 2 Jazzy, the services of std_srvs, and the types that are added.
+
+    The first type that is asked for takes as long as rosbags needs to load those of Jazzy. To be used from
+    one thread; the types it returns may be used from all.
+    """
+
+    def __init__(self) -> None:
+        self._messages: dict[str, MessageType] = {}
+        self._services: dict[str, ServiceType] = {}
+        self._service_names: set[str] = set()
+
+    def message(self, name: str) -> MessageType:
+        """Return the message type `name`: `std_msgs/msg/UInt32`, `std_msgs/UInt32` or `std_msgs/U_Int32`.
+
+        The last is how ReconROS spells it. Raises UsageError when the type, or a type in it, is not known.
+        """
+        full_name = _find(name, "msg", self._store.fielddefs.keys() - self._service_names)
+        if full_name not in self._messages:
+            self._check_fields(full_name, ())
+            self._messages[full_name] = MessageType(self._store, full_name)
+        return self._messages[full_name]
+
+    def service(self, name: str) -> ServiceType:
+        """Return the service type `name`: `std_srvs/srv/SetBool`, `std_srvs/SetBool` or `std_srvs/Set_Bool`.
+
+        Raises UsageError when the type, or a type in it, is not known.
+        """
+        full_name = _find(name, "srv", self._service_names | _STD_SRVS.keys())
+        if full_name not in self._service_names:
+            self.add_service(full_name, _STD_SRVS[full_name])
+        if full_name not in self._services:
+            request = self.message(f"{full_name}_Request")
+            response = self.message(f"{full_name}_Response")
+            self._services[full_name] = ServiceType(
+                full_name, dds_type_name(full_name), self._store.hash_rihs01(full_name), request, response
+            )
+        return self._services[full_name]
+
+    def add_message(self, name: str, text: str) -> None:
+        """Make the message type `name` (`package/msg/Type`) known, whose .msg file holds `text`.
+
+        Raises FileError (with the type in place of the path) when the text cannot be understood, UsageError
+        when the name cannot be used. Types in it may be added later.
+        """
+        self._register(name, message_definition(name, text))
+
+    def add_service(self, name: str, text: str) -> None:
+        """Make the service type `name` (`package/srv/Type`) known, whose .srv file holds `text`.
+
+        Raises as `add_message`.
+        """
+        self._register(name, service_definitions(name, text))
+        self._service_names.add(name)
+
+    @cached_property
+    def _store(self) -> Typestore:
+        store = get_typestore(Stores.ROS2_JAZZY)
+        for name, (constants, fields) in store.fielddefs.items():
+            store.fielddefs[name] = (constants, [(field, char_as_uint8(form)) for field, form in fields])
+        return store
+
+    def _register(self, name: str, definitions: Typesdict) -> None:
+        try:
+            self._store.register(definitions)
+        except TypesysError as error:
+            raise FileError(name, None, f"cannot be added: {error}", "Rename what conflicts.") from error
+
+    def _check_fields(self, name: str, owners: tuple[str, ...]) -> None:
+        for field, form in self._store.fielddefs[name][1]:
+            inner = form[1][0] if form[0] in {Nodetype.ARRAY, Nodetype.SEQUENCE} else form
+            if inner[0] != Nodetype.NAME:
+                continue
+            if inner[1] in (*owners, name):
+                raise UsageError(f"Field {field!r} of {name} contains {name} itself. Take it out.")
+            if inner[1] not in self._store.fielddefs:
+                raise UsageError(
+                    f"Field {field!r} of {name} has the type {inner[1]}, which is not known. "
+                    "Correct its name or give its .msg file."
+                )
+            self._check_fields(inner[1], (*owners, name))
+
+
+def _last_array(fields: Fielddefs) -> tuple[str, np.ndarray[Any, Any]] | None:
+    """Return the last field, and an empty array of its dtype, if it is an unbounded array of small numbers.
+
+    Numbers of more than 4 bytes may need padding between their count and the first of them.
+    """
+    field, form = fields[-1]
+    if form[0] != Nodetype.SEQUENCE or form[1][1] != 0 or form[1][0][0] != Nodetype.BASE:
+        return None
+    base = form[1][0][1][0]
+    if base == "string":
+        return None
+    empty = np.empty(0, np.dtype(base).newbyteorder("<"))
+    return (field, empty) if empty.itemsize <= _COUNT.size else None
+
+
+def _can_be_viewed(array: Any, dtype: np.dtype[Any]) -> bool:
+    return (
+        isinstance(array, np.ndarray)
+        and array.nbytes >= _SPLIT_FROM
+        and array.dtype == dtype
+        and array.ndim == 1
+        and array.flags.c_contiguous
+    )
+
+
+def _find(name: str, kind: str, known: Collection[str]) -> str:
+    package, _, rest = name.partition("/")
+    full_name = name if "/" in rest else f"{package}/{kind}/{rest}"
+    if full_name in known:
+        return full_name
+    folded = _folded(full_name)
+    found = [candidate for candidate in known if _folded(candidate) == folded]
+    if len(found) == 1:
+        return found[0]
+    similar = difflib.get_close_matches(full_name, sorted(known), n=3)
+    raise UsageError(
+        f"The type {name!r} is not known"
+        + (f"; similar are {', '.join(similar)}" if similar else "")
+        + f". Correct its name, package/{kind}/Type, or give its .{kind} file."
+    )
+
+
+def _folded(name: str) -> tuple[str, str]:
+    """Return `name` so that the split words of ReconROS, U_Int32_Multi_Array, make no difference."""
+    package_and_kind, _, type_name = name.rpartition("/")
+    return package_and_kind, type_name.replace("_", "").lower()

@@ -1,0 +1,69 @@
+"""A TOML file that knows in which line a key stands."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from reconros_zenoh.errors import FileError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+
+@dataclass(frozen=True, slots=True)
+class TomlFile:
+    """The content of a TOML file and its text."""
+
+    path: Path
+    content: dict[str, Any]
+    text: str
+
+    @classmethod
+    def read(cls, path: Path) -> TomlFile:
+        """Return the file; raise FileError with the line when it cannot be read or is not TOML."""
+        try:
+            text = path.read_text(encoding="utf-8")
+        except (OSError, UnicodeDecodeError) as error:
+            raise FileError(path, None, f"cannot be read ({error}).", "Give a readable TOML file.") from None
+        try:
+            return cls(path, tomllib.loads(text), text)
+        except tomllib.TOMLDecodeError as error:
+            found = re.search(r"at line (\d+)", str(error))
+            line = int(found[1]) if found else text.count("\n") + 1
+            raise FileError(path, line, f"is not TOML: {error}.", "Correct the syntax.") from None
+
+    def line(self, key: Sequence[str]) -> int | None:
+        """Return the line of a key given as its path of tables and names, or of its nearest enclosing table.
+
+        The standard parser keeps no positions, so the text is searched: for the header of the innermost table,
+        then for the assignment below it.
+        """
+        lines = self.text.splitlines()
+        for depth in range(len(key), -1, -1):
+            start = _find_header(lines, key[:depth])
+            if start is None:
+                continue
+            end = next((i for i in range(start, len(lines)) if lines[i].lstrip().startswith("[")), len(lines))
+            for index in range(start, end):
+                name = lines[index].split("=", 1)[0].strip().strip("\"'")
+                if depth < len(key) and (name == key[depth] or name.startswith(f"{key[depth]}.")):
+                    return index + 1
+            if depth:
+                return start
+        return None
+
+
+def _find_header(lines: Sequence[str], tables: Sequence[str]) -> int | None:
+    """Return the index of the first line below the header `[a.b]`, 0 for the top table, None when absent."""
+    if not tables:
+        return 0
+    for index, line in enumerate(lines):
+        if line.strip().startswith("[") and line.split("#", 1)[0].strip().strip("[] ").replace(
+            '"', ""
+        ) == ".".join(tables):
+            return index + 1
+    return None

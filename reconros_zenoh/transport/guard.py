@@ -1,0 +1,77 @@
+"""What all transports have in common: they can be closed, and they guard the callbacks they call."""
+
+from __future__ import annotations
+
+import logging
+from threading import RLock
+from typing import TYPE_CHECKING, Self, TypeVarTuple, Unpack
+
+from reconros_zenoh.errors import TransportError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from types import TracebackType
+
+_log = logging.getLogger(__name__)
+_Arguments = TypeVarTuple("_Arguments")
+
+
+class Closing:
+    """As a context manager it closes itself."""
+
+    __slots__ = ()
+
+    def close(self) -> None:
+        """Be over. Idempotent."""
+        raise NotImplementedError
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+class GuardedDeclaration:
+    """A declaration whose callbacks run one at a time and never once `close` has returned.
+
+    A subclass calls them through `call` and says in `_withdraw` how it leaves the network.
+    """
+
+    __slots__ = ("_closed", "_failed", "_key", "_lock")
+
+    def __init__(self, key: str) -> None:
+        self._key = key
+        self._closed = False
+        self._failed = False
+        self._lock = RLock()  # a callback may close its own declaration
+
+    def call(self, callback: Callable[[Unpack[_Arguments]], None], *arguments: *_Arguments) -> None:
+        """Run `callback` unless this is closed; its first exception is logged, none leaves this method."""
+        with self._lock:
+            if self._closed:
+                return
+            try:
+                callback(*arguments)
+            except Exception:  # noqa: BLE001 # whatever a callback raises, the transport goes on
+                if not self._failed:
+                    self._failed = True
+                    _log.exception("a callback for %s failed; it is not reported again", self._key)
+
+    def check_open(self) -> None:
+        """Raise TransportError when this is closed."""
+        if self._closed:
+            raise TransportError(f"{self._key} is closed: nothing can be sent on it any more")
+
+    def close(self) -> None:
+        """Leave the network; waits for a callback that runs on another thread. Idempotent."""
+        with self._lock:
+            if self._closed:
+                return
+            self._closed = True
+        self._withdraw()
+
+    def _withdraw(self) -> None:
+        raise NotImplementedError

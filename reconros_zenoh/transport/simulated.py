@@ -1,0 +1,358 @@
+"""A network without Zenoh: messages are events of the environment.
+
+What a link costs is not here: the board's network interface charges it.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import TYPE_CHECKING
+
+from reconros_zenoh.errors import TransportError
+from reconros_zenoh.ros.qos import Durability
+from reconros_zenoh.transport.base import Reply
+from reconros_zenoh.transport.guard import Closing, GuardedDeclaration
+from reconros_zenoh.transport.key_expressions import check_key, intersects
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+
+    from reconros_zenoh.clock.virtual import VirtualEnvironment
+    from reconros_zenoh.ros.qos import QosProfile
+    from reconros_zenoh.transport.base import OnMatching, OnReply, Parts, Request, Sample
+
+
+class SimulatedNetwork:
+    """Carries messages between its transports in no time, as events of `environment`; deterministic.
+
+    It belongs to the thread of the environment; only the replies of a `Request` may come from another one.
+    """
+
+    def __init__(self, environment: VirtualEnvironment) -> None:
+        self.environment = environment
+        # Dictionaries serve as sets that keep the order in which things were declared.
+        self.publishers: dict[_Publisher, None] = {}
+        self.subscriptions: dict[_Subscription, None] = {}
+        self.queriers: dict[_Querier, None] = {}
+        self.servers: dict[_Server, None] = {}
+        self.tokens: dict[_Token, None] = {}
+        self.watches: dict[_Watch, None] = {}
+
+    def transport(self, session_id: str) -> SimulatedTransport:
+        """Return a new session of this network; `session_id` is lower case hexadecimal, as of Zenoh."""
+        return SimulatedTransport(self, session_id)
+
+
+class SimulatedTransport(Closing):
+    """A `Transport` in a `SimulatedNetwork`. Sinks are called by the event loop, never from within `put`.
+
+    A payload of one part is handed over by reference.
+    """
+
+    def __init__(self, network: SimulatedNetwork, session_id: str) -> None:
+        self.session_id = session_id
+        self._network = network
+        self._declarations: dict[_Declaration, None] = {}
+        self._closed = False
+
+    def publish(self, key: str, qos: QosProfile, on_matching: OnMatching | None = None) -> _Publisher:
+        """Declare a publisher, see `Transport.publish`."""
+        return _Publisher(self._enter(key), key, qos, on_matching)
+
+    def subscribe(self, key: str, sink: Callable[[Sample], None], qos: QosProfile) -> _Subscription:
+        """Declare a subscription, see `Transport.subscribe`."""
+        return _Subscription(self._enter(key), key, sink, qos)
+
+    def serve(self, key: str, sink: Callable[[Request], None]) -> _Server:
+        """Declare a server, see `Transport.serve`."""
+        return _Server(self._enter(key), key, sink)
+
+    def request(self, key: str, on_matching: OnMatching | None = None) -> _Querier:
+        """Declare a querier, see `Transport.request`."""
+        return _Querier(self._enter(key), key, on_matching)
+
+    def declare_token(self, key: str) -> _Token:
+        """Declare a liveliness token."""
+        return _Token(self._enter(key), key)
+
+    def tokens(self, key: str, timeout_ns: int) -> list[str]:  # noqa: ARG002 # they are known at once
+        """Return the keys of the live tokens that match `key`, without waiting."""
+        tokens = self._enter(key)[0].tokens
+        return list(dict.fromkeys(token.key for token in tokens if intersects(key, token.key)))
+
+    def watch_tokens(self, key: str, on_change: Callable[[str, bool], None]) -> _Watch:
+        """Report tokens, see `Transport.watch_tokens`."""
+        return _Watch(self._enter(key), key, on_change)
+
+    def close(self) -> None:
+        """Close every declaration. Idempotent."""
+        self._closed = True
+        for declaration in tuple(self._declarations):
+            declaration.close()
+
+    def _enter(self, key: str) -> _Home:
+        check_key(key)
+        if self._closed:
+            raise TransportError(f"the transport is closed: {key} cannot be declared")
+        return self._network, self._declarations
+
+
+_Home = tuple[SimulatedNetwork, "dict[_Declaration, None]"]
+
+
+class _Declaration(GuardedDeclaration):
+    """Stands in the tables of its network and of its transport until it is closed."""
+
+    __slots__ = ("_mine", "key", "network")
+
+    def __init__(self, home: _Home, key: str) -> None:
+        super().__init__(key)
+        self.key = key
+        self.network, self._mine = home
+        self._mine[self] = None
+
+    def _withdraw(self) -> None:
+        del self._mine[self]
+
+    def post(self, callback: Callable[..., None], *arguments: object) -> None:
+        """Have `callback` called as an event of the present time, guarded."""
+        self.network.environment.post(self.call, callback, *arguments)
+
+
+class _Matcher(_Declaration):
+    """A publisher or querier: keeps its route, and tells when it gets its first and loses its last."""
+
+    __slots__ = ("_matched", "_on_matching")
+
+    def __init__(self, home: _Home, key: str, on_matching: OnMatching | None) -> None:
+        super().__init__(home, key)
+        self._on_matching = on_matching
+        self._matched: bool | None = None
+
+    def tell_matching(self, matched: bool) -> None:
+        """Report whether there is a counterpart, if that is news."""
+        if matched is not self._matched:
+            self._matched = matched
+            if self._on_matching is not None:
+                self.post(self._on_matching, matched)
+
+
+class _Sample:
+    """A message on its way; shared by all who get it."""
+
+    __slots__ = ("_parts", "attachment", "key")
+
+    def __init__(self, key: str, attachment: bytes | None, parts: Parts) -> None:
+        self.key = key
+        self.attachment = attachment
+        self._parts = parts
+
+    def read(self) -> memoryview:
+        return _payload(self._parts)
+
+
+class _Publisher(_Matcher):
+    __slots__ = ("_route", "cache")
+
+    def __init__(self, home: _Home, key: str, qos: QosProfile, on_matching: OnMatching | None) -> None:
+        super().__init__(home, key, on_matching)
+        transient = qos.durability is Durability.TRANSIENT_LOCAL
+        self.cache: deque[_Sample] | None = deque(maxlen=qos.depth) if transient else None
+        self._route: tuple[_Subscription, ...] = ()
+        self.network.publishers[self] = None
+        self.find_route()
+
+    def find_route(self) -> None:
+        """Know the present subscriptions of this key."""
+        self._route = tuple(s for s in self.network.subscriptions if intersects(s.key, self.key))
+        self.tell_matching(bool(self._route))
+
+    def put(self, parts: Parts, attachment: bytes | None) -> None:
+        self.check_open()
+        if not self._route and self.cache is None:
+            return
+        sample = _Sample(self.key, attachment, parts)
+        if self.cache is not None:
+            self.cache.append(sample)
+        for subscription in self._route:
+            subscription.post(subscription.sink, sample)
+
+    def _withdraw(self) -> None:
+        super()._withdraw()
+        del self.network.publishers[self]
+
+
+class _Subscription(_Declaration):
+    __slots__ = ("sink",)
+
+    def __init__(self, home: _Home, key: str, sink: Callable[[Sample], None], qos: QosProfile) -> None:
+        super().__init__(home, key)
+        self.sink = sink
+        self.network.subscriptions[self] = None
+        for publisher in self._tell_publishers():
+            if qos.durability is Durability.TRANSIENT_LOCAL and publisher.cache is not None:
+                for sample in list(publisher.cache)[-qos.depth :]:
+                    self.post(sink, sample)
+
+    def _tell_publishers(self) -> list[_Publisher]:
+        publishers = [p for p in self.network.publishers if intersects(p.key, self.key)]
+        for publisher in publishers:
+            publisher.find_route()
+        return publishers
+
+    def _withdraw(self) -> None:
+        super()._withdraw()
+        del self.network.subscriptions[self]
+        self._tell_publishers()
+
+
+class _Exchange:
+    """A request on its way: counts the servers that have not let go of it."""
+
+    __slots__ = ("_on_reply", "_over", "_querier", "_waiting")
+
+    def __init__(self, querier: _Querier, on_reply: OnReply, servers: int) -> None:
+        self._querier = querier
+        self._on_reply = on_reply
+        self._waiting = servers
+        self._over = False
+
+    def post_answer(self, reply: Reply | None) -> None:
+        """Have the event loop take the answer of one server; None if it gives none. From any thread."""
+        self._querier.network.environment.post(self._answer, reply)
+
+    def finish(self) -> None:
+        """Tell the client that nothing more comes."""
+        if not self._over:
+            self._over = True
+            self._querier.call(self._on_reply, None)
+
+    def _answer(self, reply: Reply | None) -> None:
+        if reply is not None and not self._over:
+            self._querier.call(self._on_reply, reply)
+        self._waiting -= 1
+        if self._waiting <= 0:
+            self.finish()
+
+
+class _Request:
+    """A request at one server; when it is forgotten unanswered the client learns that nothing comes."""
+
+    __slots__ = ("_exchange", "_parts", "attachment", "key")
+
+    def __init__(self, key: str, attachment: bytes | None, parts: Parts, exchange: _Exchange) -> None:
+        self.key = key
+        self.attachment = attachment
+        self._parts = parts
+        self._exchange: _Exchange | None = exchange
+
+    def read(self) -> memoryview:
+        return _payload(self._parts)
+
+    def reply(self, parts: Parts, attachment: bytes | None) -> None:
+        self._take().post_answer(Reply(_payload(parts), attachment, None))
+
+    def reply_error(self, text: str) -> None:
+        self._take().post_answer(Reply(None, None, text))
+
+    def _take(self) -> _Exchange:
+        exchange, self._exchange = self._exchange, None
+        if exchange is None:
+            raise TransportError(f"the request on {self.key} is answered already")
+        return exchange
+
+    def __del__(self) -> None:
+        if self._exchange is not None:
+            self._exchange.post_answer(None)
+
+
+class _Querier(_Matcher):
+    __slots__ = ("_route",)
+
+    def __init__(self, home: _Home, key: str, on_matching: OnMatching | None) -> None:
+        super().__init__(home, key, on_matching)
+        self._route: tuple[_Server, ...] = ()
+        self.network.queriers[self] = None
+        self.find_route()
+
+    def find_route(self) -> None:
+        """Know the present servers of this key."""
+        self._route = tuple(s for s in self.network.servers if intersects(s.key, self.key))
+        self.tell_matching(bool(self._route))
+
+    def get(self, parts: Parts, attachment: bytes | None, on_reply: OnReply, timeout_ns: int) -> None:
+        self.check_open()
+        exchange = _Exchange(self, on_reply, len(self._route))
+        for server in self._route:
+            server.post(server.sink, _Request(server.key, attachment, parts, exchange))
+        # Without a server it is over at once, but never from within this call.
+        self.network.environment.call_later(timeout_ns if self._route else 0, exchange.finish)
+
+    def _withdraw(self) -> None:
+        super()._withdraw()
+        del self.network.queriers[self]
+
+
+class _Server(_Declaration):
+    __slots__ = ("sink",)
+
+    def __init__(self, home: _Home, key: str, sink: Callable[[Request], None]) -> None:
+        super().__init__(home, key)
+        self.sink = sink
+        self.network.servers[self] = None
+        self._tell_queriers()
+
+    def _tell_queriers(self) -> None:
+        for querier in self.network.queriers:
+            if intersects(querier.key, self.key):
+                querier.find_route()
+
+    def _withdraw(self) -> None:
+        super()._withdraw()
+        del self.network.servers[self]
+        self._tell_queriers()
+
+
+class _Token(_Declaration):
+    """A liveliness token; tokens of one key count as one."""
+
+    __slots__ = ()
+
+    def __init__(self, home: _Home, key: str) -> None:
+        super().__init__(home, key)
+        self._tell_watches(alive=True)
+        self.network.tokens[self] = None
+
+    def _tell_watches(self, *, alive: bool) -> None:
+        if all(token.key != self.key for token in self.network.tokens):
+            for watch in self.network.watches:
+                watch.report((self.key,), alive=alive)
+
+    def _withdraw(self) -> None:
+        super()._withdraw()
+        del self.network.tokens[self]
+        self._tell_watches(alive=False)
+
+
+class _Watch(_Declaration):
+    __slots__ = ("_on_change",)
+
+    def __init__(self, home: _Home, key: str, on_change: Callable[[str, bool], None]) -> None:
+        super().__init__(home, key)
+        self._on_change = on_change
+        self.report(dict.fromkeys(token.key for token in self.network.tokens), alive=True)
+        self.network.watches[self] = None
+
+    def report(self, tokens: Iterable[str], *, alive: bool) -> None:
+        """Report those of `tokens` that match."""
+        for token in tokens:
+            if intersects(self.key, token):
+                self.post(self._on_change, token, alive)
+
+    def _withdraw(self) -> None:
+        super()._withdraw()
+        del self.network.watches[self]
+
+
+def _payload(parts: Parts) -> memoryview:
+    return memoryview(parts[0] if len(parts) == 1 else b"".join(parts)).toreadonly()

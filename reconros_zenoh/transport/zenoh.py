@@ -1,0 +1,401 @@
+"""The transport over Zenoh, configured as rmw_zenoh has it; the only file that imports zenoh.
+
+Callbacks run directly on Zenoh's network threads (`indirect=False`): a thread of its own for each declaration
+costs a change of thread per message (20 us of a round trip of 290 us) and holds up the end of a process that
+forgot to close.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from contextlib import suppress
+from functools import partial
+from typing import TYPE_CHECKING, Any, Self
+
+import zenoh
+from zenoh import ext
+from zenoh.handlers import Callback
+from zenoh.shm import GarbageCollect, ShmProvider, ZShmMut
+
+from reconros_zenoh.errors import TransportError, UsageError
+from reconros_zenoh.ros.qos import Durability, History, Reliability
+from reconros_zenoh.transport.base import Reply
+from reconros_zenoh.transport.frames import Frames
+from reconros_zenoh.transport.guard import Closing, GuardedDeclaration
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from reconros_zenoh.ros.qos import QosProfile
+    from reconros_zenoh.transport.base import OnMatching, OnReply, Parts, Request, Sample
+
+_HEARTBEAT_S = 0.5
+
+
+class ZenohRouter(Closing):
+    """A Zenoh router inside this process: what `reconros router` and tests run instead of rmw_zenohd."""
+
+    def __init__(self, session: zenoh.Session) -> None:
+        self._session = session
+
+    @classmethod
+    def open(cls, listen: str = "tcp/127.0.0.1:7447") -> Self:
+        """Return a router that accepts sessions on `listen`.
+
+        Raises TransportError when it cannot listen there, UsageError when `listen` is not an endpoint.
+        """
+        config = _config("router", {"listen/endpoints": listen})
+        # Nobody is scouted for: without this, opening takes half a second.
+        config.insert_json5("scouting/delay", "0")
+        try:
+            return cls(zenoh.open(config))
+        except zenoh.ZError as error:
+            raise TransportError(
+                f"no router can listen on {listen}: {_reason(error)}. "
+                "Use the router that runs there, or choose another endpoint."
+            ) from error
+
+    def close(self) -> None:
+        """Stop routing; sessions find a new router at the same endpoint by themselves. Idempotent."""
+        self._session.close()  # type: ignore[no-untyped-call] # so is the stub
+
+
+class ZenohTransport(Closing):
+    """A `Transport` over a Zenoh session that rmw_zenoh sessions take for one of theirs.
+
+    What a sink gets from a publisher of the same session, it gets within `put`.
+    """
+
+    def __init__(self, session: zenoh.Session) -> None:
+        self.session_id = str(session.zid())
+        self.session = session
+        self.declarations: set[_Declaration] = set()
+        self.frames = Frames(_open_pool)
+
+    @classmethod
+    def open(cls, router: str = "tcp/127.0.0.1:7447", *, timeout_s: float = 3.0) -> Self:
+        """Return a session that is connected to `router`, for which it waits at most `timeout_s`.
+
+        Raises TransportError when no router answers, UsageError when `router` is not an endpoint.
+        """
+        config = _config("peer", {"connect/endpoints": router, "listen/endpoints": "tcp/127.0.0.1:0"})
+        config.insert_json5("connect/timeout_ms", json.dumps(max(1, round(timeout_s * 1000))))
+        config.insert_json5("connect/exit_on_failure", "true")
+        retry = {"period_init_ms": 100, "period_max_ms": 1000, "period_increase_factor": 2}
+        config.insert_json5("connect/retry", json.dumps(retry))
+        try:
+            return cls(zenoh.open(config))
+        except zenoh.ZError as error:
+            raise TransportError(f"no Zenoh router at {router}: start one with `reconros router`") from error
+
+    def publish(self, key: str, qos: QosProfile, on_matching: OnMatching | None = None) -> _Publisher:
+        """Declare a publisher, see `Transport.publish`."""
+        return _Publisher(self, key, qos, on_matching)
+
+    def subscribe(self, key: str, sink: Callable[[Sample], None], qos: QosProfile) -> _Declaration:
+        """Declare a subscription, see `Transport.subscribe`."""
+        declaration = _Declaration(self, key)
+        is_pattern = "*" in key
+
+        def on_sample(sample: zenoh.Sample) -> None:
+            declaration.call(sink, _Sample(str(sample.key_expr) if is_pattern else key, sample))
+
+        handler = Callback(on_sample, indirect=False)
+        if qos.durability is Durability.TRANSIENT_LOCAL:
+            recovery = ext.RecoveryConfig(periodic_queries=None, heartbeat=True)
+            declaration.add(
+                ext.declare_advanced_subscriber,
+                self.session,
+                key,
+                handler,
+                history=ext.HistoryConfig(detect_late_publishers=True, max_samples=qos.depth),
+                recovery=recovery if qos.reliability is Reliability.RELIABLE else None,
+                subscriber_detection=True,
+            )
+        else:
+            declaration.add(self.session.declare_subscriber, key, handler)
+        return declaration
+
+    def serve(self, key: str, sink: Callable[[Request], None]) -> _Declaration:
+        """Declare a server, see `Transport.serve`."""
+        declaration = _Declaration(self, key)
+        is_pattern = "*" in key
+
+        def on_query(query: zenoh.Query) -> None:
+            declaration.call(sink, _Request(str(query.key_expr) if is_pattern else key, query, self))
+
+        handler = Callback(on_query, indirect=False)
+        declaration.add(self.session.declare_queryable, key, handler, complete=True)
+        return declaration
+
+    def request(self, key: str, on_matching: OnMatching | None = None) -> _Querier:
+        """Declare a querier, see `Transport.request`."""
+        return _Querier(self, key, on_matching)
+
+    def declare_token(self, key: str) -> _Declaration:
+        """Declare a liveliness token, see `Transport.declare_token`."""
+        declaration = _Declaration(self, key)
+        declaration.add(self.session.liveliness().declare_token, key)
+        return declaration
+
+    def tokens(self, key: str, timeout_ns: int) -> list[str]:
+        """Return the keys of the live tokens that match `key`; waits at most `timeout_ns`."""
+        try:
+            replies = self.session.liveliness().get(key, timeout=timeout_ns / 1e9)
+        except zenoh.ZError as error:
+            raise _failure(f"the tokens {key} cannot be asked for", error) from error
+        return [str(reply.ok.key_expr) for reply in replies if reply.ok is not None]
+
+    def watch_tokens(self, key: str, on_change: Callable[[str, bool], None]) -> _Declaration:
+        """Report tokens, see `Transport.watch_tokens`."""
+        declaration = _Declaration(self, key)
+
+        def on_sample(sample: zenoh.Sample) -> None:
+            declaration.call(on_change, str(sample.key_expr), sample.kind == zenoh.SampleKind.PUT)
+
+        handler = Callback(on_sample, indirect=False)
+        declaration.add(self.session.liveliness().declare_subscriber, key, handler, history=True)
+        return declaration
+
+    def close(self) -> None:
+        """Close every declaration and the session. Idempotent."""
+        for declaration in tuple(self.declarations):
+            declaration.close()
+        self.session.close()  # type: ignore[no-untyped-call] # so is the stub
+
+
+class _Declaration(GuardedDeclaration):
+    """Entities of the session that are undeclared together."""
+
+    __slots__ = ("_entities", "_transport")
+
+    def __init__(self, transport: ZenohTransport, key: str) -> None:
+        super().__init__(key)
+        self._transport = transport
+        self._entities: list[Any] = []
+
+    def add(self, declare: Callable[..., Any], *arguments: object, **options: object) -> Any:
+        """Return the entity that `declare` declares; its callbacks may come before this returns."""
+        try:
+            entity = declare(*arguments, **options)
+        except zenoh.ZError as error:
+            raise _failure(f"{self._key} cannot be declared", error) from error
+        self._entities.append(entity)
+        self._transport.declarations.add(self)
+        return entity
+
+    def _withdraw(self) -> None:
+        self._transport.declarations.discard(self)
+        for entity in self._entities:
+            with suppress(zenoh.ZError):  # the session may have gone first
+                entity.undeclare()
+
+
+class _Matcher(_Declaration):
+    """A publisher or querier: tells when it gets its first counterpart and when it loses its last."""
+
+    __slots__ = ("_matched", "_on_matching")
+
+    def __init__(self, transport: ZenohTransport, key: str, on_matching: OnMatching | None) -> None:
+        super().__init__(transport, key)
+        self._on_matching = on_matching
+        self._matched: bool | None = None
+
+    def _watch(self, entity: zenoh.Publisher | zenoh.Querier) -> None:
+        if self._on_matching is not None:
+            handler = Callback(self._on_status, indirect=False)
+            self.add(entity.declare_matching_listener, handler)
+            status: Any = entity.matching_status  # a MatchingStatus; the stub says bool
+            self.call(self._start, status.matching)
+
+    def _on_status(self, status: zenoh.MatchingStatus) -> None:
+        self.call(self._change, status.matching)
+
+    def _start(self, matched: bool) -> None:
+        if self._matched is None:  # else a change has come first, and is newer
+            self._change(matched)
+
+    def _change(self, matched: bool) -> None:
+        if matched is not self._matched:
+            self._matched = matched
+            assert self._on_matching is not None
+            self._on_matching(matched)
+
+
+class _Publisher(_Matcher):
+    __slots__ = ("_put",)
+
+    def __init__(
+        self, transport: ZenohTransport, key: str, qos: QosProfile, on_matching: OnMatching | None
+    ) -> None:
+        super().__init__(transport, key, on_matching)
+        reliable = qos.reliability is Reliability.RELIABLE
+        block = reliable and qos.history is History.KEEP_ALL
+        options: Any = {
+            "congestion_control": zenoh.CongestionControl.BLOCK if block else zenoh.CongestionControl.DROP,
+            "reliability": zenoh.Reliability.RELIABLE if reliable else zenoh.Reliability.BEST_EFFORT,
+        }
+        # An advanced publisher has no matching listener: a plain one beside it tells the same.
+        publisher = self.add(transport.session.declare_publisher, key, **options)
+        self._watch(publisher)
+        if qos.durability is Durability.TRANSIENT_LOCAL:
+            heartbeat = ext.MissDetectionConfig(heartbeat=None, sporadic_heartbeat=_HEARTBEAT_S)
+            publisher = self.add(
+                ext.declare_advanced_publisher,
+                transport.session,
+                key,
+                cache=ext.CacheConfig(qos.depth),
+                publisher_detection=True,
+                sample_miss_detection=heartbeat if reliable else None,
+                **options,
+            )
+        self._put = publisher.put
+
+    def put(self, parts: Parts, attachment: bytes | None) -> None:
+        self.check_open()
+        try:
+            self._put(self._transport.frames.join(parts), attachment=attachment)
+        except zenoh.ZError as error:
+            raise _failure(f"a message on {self._key} cannot be sent", error) from error
+
+
+class _Sample:
+    __slots__ = ("_sample", "key")
+
+    def __init__(self, key: str, sample: zenoh.Sample) -> None:
+        self.key = key
+        self._sample = sample
+
+    @property
+    def attachment(self) -> bytes | None:
+        return _bytes(self._sample.attachment)
+
+    def read(self) -> memoryview:
+        return memoryview(self._sample.payload.to_bytes())
+
+
+class _Request:
+    __slots__ = ("_query", "_transport", "key")
+
+    def __init__(self, key: str, query: zenoh.Query, transport: ZenohTransport) -> None:
+        self.key = key
+        self._query: zenoh.Query | None = query
+        self._transport = transport
+
+    @property
+    def attachment(self) -> bytes | None:
+        return _bytes(self._open().attachment)
+
+    def read(self) -> memoryview:
+        return memoryview(_bytes(self._open().payload) or b"")
+
+    def reply(self, parts: Parts, attachment: bytes | None) -> None:
+        payload = self._transport.frames.join(parts)
+        self._answer(lambda query: query.reply(self.key, payload, attachment=attachment))
+
+    def reply_error(self, text: str) -> None:
+        self._answer(lambda query: query.reply_err(text))
+
+    def _answer(self, send: Callable[[zenoh.Query], None]) -> None:
+        query = self._open()
+        self._query = None
+        try:
+            send(query)
+        except zenoh.ZError as error:
+            raise _failure(f"the request on {self.key} cannot be answered", error) from error
+        finally:
+            # This tells the client that nothing more comes.
+            query.drop()  # type: ignore[no-untyped-call] # so is the stub
+
+    def _open(self) -> zenoh.Query:
+        if self._query is None:
+            raise TransportError(f"the request on {self.key} is answered already")
+        return self._query
+
+
+class _Querier(_Matcher):
+    __slots__ = ("_key_expr",)
+
+    def __init__(self, transport: ZenohTransport, key: str, on_matching: OnMatching | None) -> None:
+        super().__init__(transport, key, on_matching)
+        querier = self.add(transport.session.declare_querier, key, target=zenoh.QueryTarget.ALL_COMPLETE)
+        self._key_expr = querier.key_expr
+        self._watch(querier)
+
+    def get(self, parts: Parts, attachment: bytes | None, on_reply: OnReply, timeout_ns: int) -> None:
+        self.check_open()
+        handler = Callback(partial(self._take, on_reply), partial(self.call, on_reply, None), indirect=False)
+        try:
+            # A Zenoh querier has one timeout for all; a get of the session has its own and costs the same.
+            self._transport.session.get(
+                self._key_expr,
+                handler,
+                target=zenoh.QueryTarget.ALL_COMPLETE,
+                consolidation=zenoh.ConsolidationMode.NONE,
+                timeout=timeout_ns / 1e9,
+                payload=self._transport.frames.join(parts),
+                attachment=attachment,
+            )
+        except zenoh.ZError as error:
+            raise _failure(f"a request on {self._key} cannot be sent", error) from error
+
+    def _take(self, on_reply: OnReply, reply: zenoh.Reply) -> None:
+        if (sample := reply.ok) is not None:
+            payload = memoryview(sample.payload.to_bytes())
+            self.call(on_reply, Reply(payload, _bytes(sample.attachment), None))
+        elif (error := reply.err) is not None and not _is_timeout(reply, error):
+            self.call(on_reply, Reply(None, None, error.payload.to_string()))
+
+
+def _open_pool(pool_bytes: int) -> Callable[[int], ZShmMut | None] | None:
+    try:
+        pool = ShmProvider.default_backend(pool_bytes)
+    except zenoh.ZError:
+        return None
+
+    def allocate(size: int) -> ZShmMut | None:
+        # It does not wait (BlockOn): a reader that keeps its samples would stop the publisher.
+        for _ in range(2):  # what the first try collects may suffice for the second only
+            with suppress(zenoh.ZError):
+                return pool.alloc(size, GarbageCollect())
+        return None
+
+    return allocate
+
+
+def _config(mode: str, endpoints: dict[str, str]) -> zenoh.Config:
+    """Return the configuration of rmw_zenoh; raises UsageError when an endpoint is none."""
+    config = zenoh.Config()
+    config.insert_json5("mode", json.dumps(mode))
+    for entry, endpoint in endpoints.items():
+        try:
+            config.insert_json5(entry, json.dumps([endpoint]))
+        except zenoh.ZError as error:
+            raise UsageError(
+                f"{endpoint!r} is not a Zenoh endpoint: give one such as tcp/127.0.0.1:7447"
+            ) from error
+    config.insert_json5("scouting/multicast/enabled", "false")
+    config.insert_json5("scouting/gossip/enabled", "true")
+    config.insert_json5("timestamping/enabled", "true")  # the caches of transient local publishers need it
+    config.insert_json5("transport/shared_memory/enabled", "true")
+    return config
+
+
+def _bytes(value: zenoh.ZBytes | None) -> bytes | None:
+    return None if value is None else value.to_bytes()
+
+
+def _is_timeout(reply: zenoh.Reply, error: zenoh.ReplyError) -> bool:
+    """Whether Zenoh itself answers that time is up: no queryable (they count from 1) is the replier."""
+    replier = reply.replier_id
+    return (replier is None or replier.eid == 0) and error.payload.to_bytes() == b"Timeout"
+
+
+def _failure(what: str, error: zenoh.ZError) -> TransportError:
+    return TransportError(f"{what}: {_reason(error)}")
+
+
+def _reason(error: zenoh.ZError) -> str:
+    """Return what Zenoh says without the places in its source."""
+    return re.sub(r"\.? at /[^\s\]]+", "", str(error)).rstrip(".")

@@ -1,0 +1,97 @@
+"""Mapping files: what they say and the line of each mistake."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import pytest
+
+from reconros_zenoh.errors import FileError
+from reconros_zenoh.project.mapping_file import CallbackMapping, Mapping, read_mapping
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+GOOD = """\
+executor = "reconros"
+software_workers = 2
+
+[callbacks.sobel]
+slots = [2, 3]
+
+[callbacks.hash]
+software = true
+slots = [3]
+"""
+
+
+def read(tmp_path: Path, text: str) -> Mapping:
+    path = tmp_path / "mine.toml"
+    path.write_text(text, encoding="utf-8")
+    return read_mapping(path, ("sobel", "hash"), (2, 3))
+
+
+def test_a_mapping(tmp_path: Path) -> None:
+    assert read(tmp_path, GOOD) == Mapping(
+        name="mine",
+        executor="reconros",
+        software_workers=2,
+        hardware_workers=2,
+        callbacks={
+            "sobel": CallbackMapping(software=False, slots=(2, 3)),
+            "hash": CallbackMapping(software=True, slots=(3,)),
+        },
+    )
+
+
+def test_hardware_workers(tmp_path: Path) -> None:
+    assert read(tmp_path, "hardware_workers = 1\n" + GOOD).hardware_workers == 1
+
+
+def test_the_standard_executor_has_no_hardware_workers(tmp_path: Path) -> None:
+    software = "[callbacks.sobel]\nsoftware = true\n[callbacks.hash]\nsoftware = true\n"
+    mapping = read(tmp_path, f'executor = "standard"\nsoftware_workers = 2\n{software}')
+    assert (mapping.executor, mapping.hardware_workers) == ("standard", 0)
+
+
+MISTAKES = {
+    "syntax": (GOOD.replace("= 2\n", "= \n"), 2, "TOML"),
+    "unknown key": ("workers = 2\n" + GOOD, 1, "workers: unknown key. Known keys: callbacks, executor"),
+    "name": ('name = "x"\n' + GOOD, 1, "unknown key"),
+    "unknown key of a callback": (GOOD + "slot = 1\n", 10, "Known keys: slots, software"),
+    "unknown executor": (GOOD.replace("reconros", "other"), 1, "'reconros' or 'standard'"),
+    "no executor": (GOOD.split("\n", 1)[1], None, "executor: Field required"),
+    "no workers": (GOOD.replace("software_workers = 2\n", ""), None, "software_workers: Field required"),
+    "negative workers": (GOOD.replace("= 2", "= -2"), 2, "software_workers"),
+    "negative hardware workers": ("hardware_workers = -1\n" + GOOD, 1, "hardware_workers"),
+    "workers that are no number": (GOOD.replace("= 2", "= true"), 2, "valid integer"),
+    "software that is no boolean": (GOOD.replace("true", '"yes"'), 8, "valid boolean"),
+    "slot that is no number": (GOOD.replace("[2, 3]", '["RS2"]'), 5, "valid integer"),
+    "unknown callback": (GOOD.replace("sobel", "sobol"), 4, "'sobol'. Its callbacks: sobel, hash."),
+    "unknown slot": (GOOD.replace("[2, 3]", "[2, 4]"), 5, "unknown slot 4. Known slots: 2, 3."),
+    "no place": (GOOD.replace("slots = [2, 3]", "software = false"), 4, "no place"),
+    "callback not mapped": (
+        GOOD.split("[callbacks.hash]", maxsplit=1)[0],
+        None,
+        "'hash' of the project is not mapped",
+    ),
+    "hardware under the standard executor": (GOOD.replace("reconros", "standard"), 5, "knows only software"),
+    "no software workers": (GOOD.replace("= 2", "= 0"), 8, "0 software workers"),
+    "no hardware workers": ("hardware_workers = 0\n" + GOOD, 6, "0 hardware workers"),
+}
+
+
+@pytest.mark.parametrize(("text", "line", "problem"), MISTAKES.values(), ids=MISTAKES.keys())
+def test_a_mistake_is_reported_with_its_line(
+    tmp_path: Path, text: str, line: int | None, problem: str
+) -> None:
+    with pytest.raises(FileError) as caught:
+        read(tmp_path, text)
+    assert caught.value.line == line
+    assert problem in str(caught.value)
+    assert caught.value.remedy
+
+
+def test_a_missing_file(tmp_path: Path) -> None:
+    with pytest.raises(FileError, match="cannot be read"):
+        read_mapping(tmp_path / "none.toml", (), ())

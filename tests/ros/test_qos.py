@@ -1,0 +1,90 @@
+"""The compact QoS of graph tokens."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from reconros_zenoh.ros.qos import INFINITE_NS, Durability, History, Liveliness, QosProfile, Reliability
+
+durations = st.integers(0, INFINITE_NS) | st.just(INFINITE_NS)
+profiles = st.builds(
+    QosProfile,
+    st.sampled_from(Reliability),
+    st.sampled_from(Durability),
+    st.sampled_from(History),
+    st.integers(0, 2**64 - 1) | st.integers(0, 50),
+    durations,
+    durations,
+    st.sampled_from(Liveliness),
+    durations,
+)
+
+GOLDEN = [
+    (QosProfile(), "::,10:,:,:,,"),
+    (QosProfile(depth=42), "::,:,:,:,,"),
+    (QosProfile(reliability=Reliability.BEST_EFFORT), "2::,10:,:,:,,"),
+    (QosProfile(durability=Durability.TRANSIENT_LOCAL, depth=1), ":1:,1:,:,:,,"),
+    (QosProfile(history=History.KEEP_ALL, depth=42), "::2,:,:,:,,"),
+    (QosProfile(reliability=Reliability.BEST_EFFORT, depth=5), "2::,5:,:,:,,"),
+    (QosProfile(deadline_ns=1_500_000_000), "::,10:1,500000000:,:,,"),
+    (QosProfile(lifespan_ns=7), "::,10:,:0,7:,,"),
+    (
+        QosProfile(liveliness=Liveliness.MANUAL_BY_TOPIC, lease_ns=2_000_000_000),
+        "::,10:,:,:3,2,0",
+    ),
+    # Each half of a duration is left out by itself.
+    (QosProfile(deadline_ns=854_775_807), "::,10:0,:,:,,"),
+]
+
+
+@pytest.mark.parametrize(("profile", "text"), GOLDEN)
+def test_golden(profile: QosProfile, text: str) -> None:
+    assert profile.encode() == text
+    assert QosProfile.decode(text) == profile
+
+
+def test_fields_that_are_spelled_out_may_be_defaults() -> None:
+    assert QosProfile.decode("1:2:1,42:9223372036,854775807:,:1,,") == QosProfile(depth=42)
+
+
+@settings(deadline=None, derandomize=True)
+@given(profiles)
+def test_round_trip(profile: QosProfile) -> None:
+    assert QosProfile.decode(profile.encode()) == profile
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("", "not of the form"),
+        ("::,10", "not of the form"),
+        ("::,10:,:,:,,:", "not of the form"),
+        ("::10:,:,:,,", "not of the form"),
+        ("3::,10:,:,:,,", "'3' is no reliability"),
+        (":x:,10:,:,:,,", "'x' is no durability"),
+        ("::0,10:,:,:,,", "'0' is no history"),
+        ("::,10:,:,:7,,", "'7' is no liveliness"),
+        ("::,ten:,:,:,,", "'ten' is not a number"),
+        ("::,-1:,:,:,,", "'-1' is not a number"),
+        ("::,٣:,:,:,,", "is not a number"),
+        ("::,18446744073709551616:,:,:,,", "is not a number"),
+        (f"::,{'9' * 5000}:,:,:,,", "is not a number"),
+        ("::,10:9223372037,0:,:,,", "'9223372037' is not a number"),
+        ("::,10:,:1,1000000000:,,", "'1000000000' is not a number"),
+    ],
+)
+def test_nonsense_is_refused(text: str, reason: str) -> None:
+    with pytest.raises(ValueError, match=reason):
+        QosProfile.decode(text)
+
+
+@settings(deadline=None, derandomize=True)
+@given(st.text(alphabet=":,0129x-", max_size=20))
+def test_any_text_gives_a_profile_or_a_value_error(text: str) -> None:
+    try:
+        profile = QosProfile.decode(text)
+    except ValueError:
+        return
+    assert QosProfile.decode(profile.encode()) == profile

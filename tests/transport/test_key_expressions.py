@@ -1,0 +1,48 @@
+from __future__ import annotations
+
+import pytest
+import zenoh
+from hypothesis import given
+from hypothesis import strategies as st
+
+from reconros_zenoh.errors import TransportError
+from reconros_zenoh.transport.key_expressions import check_key, intersects
+
+CHUNKS = ["a", "b", "ab", "*", "**", "$*a", "a$*", "a$*b", "b$*a$*", "@a", "@ab", "%chatter"]
+expressions = st.lists(st.sampled_from(CHUNKS), min_size=1, max_size=5).map(
+    lambda chunks: str(zenoh.KeyExpr.autocanonize("/".join(chunks)))
+)
+
+
+@given(expressions, expressions)
+def test_intersects_as_zenoh_does(left: str, right: str) -> None:
+    assert intersects(left, right) == zenoh.KeyExpr(left).intersects(zenoh.KeyExpr(right))
+
+
+@given(st.text("ab*$/@?#", max_size=8))
+def test_accepts_what_zenoh_accepts(text: str) -> None:
+    def accepts(check: object, error: type[Exception]) -> bool:
+        try:
+            check(text)
+        except error:
+            return False
+        return True
+
+    assert accepts(check_key, TransportError) == accepts(zenoh.KeyExpr.autocanonize, zenoh.ZError)
+
+
+@pytest.mark.parametrize(
+    ("left", "right", "expected"),
+    [
+        ("0/chatter/t/h", "0/chatter/t/h", True),
+        ("0/chatter/t/h", "1/chatter/t/h", False),
+        ("@ros2_lv/0/**", "@ros2_lv/0/59/1/1/NN/%/%/node", True),
+        ("**", "@ros2_lv/0/59/1/1/NN/%/%/node", False),
+        ("@ros2_lv/0/*", "@ros2_lv/0", False),
+        ("@ros2_lv/0/**", "@ros2_lv/0", True),
+        ("reconros/*/status", "reconros/board_1/**", True),
+    ],
+)
+def test_intersects(left: str, right: str, expected: bool) -> None:
+    assert intersects(left, right) is expected
+    assert intersects(right, left) is expected
