@@ -22,9 +22,10 @@ class ClosedLoop:
     """Asks, waits, checks, records, and asks again: N times, then `done`.
 
     First it waits until somebody serves its requests and repeats an unrecorded request until one is answered;
-    `warm` happens then. It goes on once `start` has happened. A round trip is measured on the monotonic clock, from
-    just before the request is sent to the answer's arrival on the transport's thread. A request without answer
-    after `limit_ns` is lost and the loop goes on; should its answer come later, it is left aside.
+    `warm` happens then. It goes on once `start` has happened. A round trip is measured on the monotonic
+    clock, from just before the request is sent to the answer's arrival on the transport's thread. A request
+    without answer after `limit_ns` is lost and the loop goes on; should its answer come later, it is left
+    aside.
     """
 
     def __init__(
@@ -55,7 +56,8 @@ class ClosedLoop:
 
     def _run(self) -> Generator[simpy.Event, object, None]:
         yield self._matched
-        # Its index is far from those of the first requests, so that its late answer cannot be taken for theirs.
+        # Its index is far from those of the first requests, so that its late answer cannot be taken for
+        # theirs.
         while (yield from self._round_trip(-1)).outcome == "lost":
             pass
         self.warm.succeed()
@@ -87,7 +89,8 @@ class ClosedLoop:
         """Return when the next answer arrived and the answer, or None at the deadline."""
         event = self._arrival = self._environment.event()
         self._environment.call_later(max(0, deadline_ns - self._environment.now), self._arrived, event, None)
-        return (yield event)
+        arrival: tuple[int, Any] | None = yield event
+        return arrival
 
     def _match(self, matching: bool) -> None:
         """Note, on any thread, whether somebody serves the requests."""

@@ -7,7 +7,7 @@ from functools import cache
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable
 
     from reconros_zenoh.rmw.node import Node
     from reconros_zenoh.ros.types import TypeRegistry
@@ -50,7 +50,7 @@ class TopicExchange(Exchange):
     answer_topic: str
     answer_type: str
 
-    def __init__(self, inputs: Sequence[Any]) -> None:
+    def __init__(self, inputs: list[Any]) -> None:
         self._inputs = inputs
         self._expected = cache(self.expected)
 

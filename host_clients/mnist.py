@@ -18,7 +18,8 @@ if TYPE_CHECKING:
 class MnistExchange(TopicExchange):
     """An image of a digit out, its class back.
 
-    The right answer is what the shipped network says, not the label: the network errs in about one of a hundred.
+    The right answer is what the shipped network says, not the label: the network errs in about one of a
+    hundred.
     """
 
     name = "mnist"
@@ -29,7 +30,7 @@ class MnistExchange(TopicExchange):
 
     def __init__(self, rng: Generator) -> None:
         images, _ = digits()
-        super().__init__(rng.permutation(images))
+        super().__init__(list(rng.permutation(images)))
         self._classifier = Classifier()
 
     def request(self, types: TypeRegistry, given: Any) -> object:

@@ -28,7 +28,7 @@ class SobelExchange(TopicExchange):
     answer_type = "sensor_msgs/msg/Image"
 
     def __init__(self, rng: Generator) -> None:
-        super().__init__(images(rng, 8))
+        super().__init__(list(images(rng, 8)))
 
     def request(self, types: TypeRegistry, given: Any) -> object:
         """Return the picture as a message."""

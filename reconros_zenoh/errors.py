@@ -6,7 +6,6 @@ ReconrosError
 │       └── BitstreamError a bitstream that is damaged or meant for another slot
 ├── TransportError         the network did not do what was asked (no router, port in use, closed)
 ├── BadMessageError        a message that is counted and dropped; never ends a process
-├── CallbackError          a callback raised while it ran
 └── ExperimentError        an experiment that could not be completed
 """
 
@@ -27,7 +26,7 @@ class UsageError(ReconrosError):
 
 
 class FileError(UsageError):
-    """A file that cannot be used: `path:line: what is wrong. Remedy.`"""
+    """A file that cannot be used: `path:line: what is wrong. Remedy.`."""
 
     def __init__(self, path: Path | str, line: int | None, problem: str, remedy: str = "") -> None:
         self.path = path
@@ -58,10 +57,6 @@ class BadMessageError(ReconrosError):
         self.reason = reason
         self.detail = detail
         super().__init__(f"{reason}: {detail}")
-
-
-class CallbackError(ReconrosError):
-    """A callback raised while it ran."""
 
 
 class ExperimentError(ReconrosError):

@@ -39,8 +39,8 @@ class TomlFile:
     def line(self, key: Sequence[str]) -> int | None:
         """Return the line of a key given as its path of tables and names, or of its nearest enclosing table.
 
-        The standard parser keeps no positions, so the text is searched: for the header of the innermost table,
-        then for the assignment below it.
+        The standard parser keeps no positions, so the text is searched: for the header of the innermost
+        table, then for the assignment below it.
         """
         lines = self.text.splitlines()
         for depth in range(len(key), -1, -1):

@@ -5,13 +5,13 @@ from __future__ import annotations
 import struct
 import zlib
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from reconros_zenoh.errors import BitstreamError, UsageError
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
+    from pathlib import Path
 
 # magic, slot, length of the callback's name, size of the whole file, CRC-32 of name and body
 _HEADER = struct.Struct("<8sHHQI")
@@ -79,8 +79,8 @@ def read_bitstreams(folder: Path, wanted: Iterable[Bitstream]) -> Mapping[tuple[
             raise BitstreamError(
                 path,
                 None,
-                f"holds callback {content.callback!r} for slot {content.slot}, not {bitstream.callback!r} for slot "
-                f"{bitstream.slot}.",
+                f"holds callback {content.callback!r} for slot {content.slot}, "
+                f"not {bitstream.callback!r} for slot {bitstream.slot}.",
                 _REBUILD,
             )
         if content.size != bitstream.size:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 
-
 if TYPE_CHECKING:
+    from collections.abc import Callable, Generator
+    from concurrent.futures import Future
+
     import numpy as np
     import simpy
 
@@ -107,7 +108,7 @@ class HardwareThread:
 
     def compute(self, kernel: Callable[..., R], *arguments: object) -> Generator[simpy.Event, object, R]:
         """Return `kernel(*arguments)` of a pure kernel when the slot has computed it."""
-        future = self._host.start(self._host.compute, kernel, *arguments)
+        future: Future[R] = self._host.start(self._host.compute, kernel, *arguments)
         if self._compute_ns is None:
             result = yield from self._host.result(future)
             self._timeline.mark("execution")

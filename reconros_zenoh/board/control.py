@@ -60,8 +60,8 @@ class ControlServer:
 def status(board: Board, executor: Executor) -> dict[str, Any]:
     """Return what the board is and what it has done so far; called by the thread of its event loop.
 
-    `host` says how well this host kept up: results later than the model had them ready (`overruns`) and how late
-    the event loop was (`lag_*`, wall time only).
+    `host` says how well this host kept up: results later than the model had them ready (`overruns`) and how
+    late the event loop was (`lag_*`, wall time only).
     """
     overruns = board.host.overruns
     lag = board.environment.lag() if isinstance(board.environment, WallEnvironment) else None

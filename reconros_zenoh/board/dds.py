@@ -17,11 +17,11 @@ if TYPE_CHECKING:
 
 
 class DdsStack:
-    """The link of the board and the communication stack on its cores; costs nothing where nothing is modelled.
+    """The link of the board and the communication stack on its cores; free where nothing is modelled.
 
-    The link is charged here rather than in the transport, so that the same model holds in both clocks. In wall
-    time a message has spent some of the modelled link time in the real network already: its source timestamp
-    says how much, and only the rest is waited for.
+    The link is charged here rather than in the transport, so that the same model holds in both clocks. In
+    wall time a message has spent some of the modelled link time in the real network already: its source
+    timestamp says how much, and only the rest is waited for.
     """
 
     def __init__(

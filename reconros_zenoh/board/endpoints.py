@@ -1,4 +1,4 @@
-"""The ends of topics, services and timers on a board: what makes a callback ready, and where its answer goes."""
+"""The ends of topics, services and timers on a board: where events come from and answers go."""
 
 from __future__ import annotations
 

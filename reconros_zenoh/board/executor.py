@@ -44,9 +44,10 @@ class _Registration:
 class Executor:
     """Runs callbacks on a board with m software and n hardware workers.
 
-    Callbacks are added, then `spin` starts the workers (ReconROS Executor, Section IV, Listing 4). `kind` "standard"
-    is the executor of ROS 2, which knows software workers only. Hardware workers serve the slots in the order of
-    their ids. `bitstreams` is the folder of the partial bitstreams; without it they are held in memory only.
+    Callbacks are added, then `spin` starts the workers (ReconROS Executor, Section IV, Listing 4). `kind`
+    "standard" is the executor of ROS 2, which knows software workers only. Hardware workers serve the slots
+    in the order of their ids. `bitstreams` is the folder of the partial bitstreams; without it they are held
+    in memory only.
     """
 
     def __init__(
@@ -82,7 +83,7 @@ class Executor:
         function: SoftwareCallback,
         check: Callable[[Any], None] | None = None,
     ) -> None:
-        """Let the callback `name` run as a function; `check` raises BadMessageError for what it cannot use."""
+        """Let the callback `name` run as a function; `check` raises BadMessageError for bad messages."""
         if not self._software_workers:
             raise UsageError(f"callback {name!r} runs in software, but there are no software workers.")
         self._register(name, kind, source, check).software = function
@@ -158,7 +159,7 @@ class Executor:
         self._finish(dispatch)
 
     def statistics(self) -> dict[str, dict[str, object]]:
-        """Return for each callback where it may run, how often it was called and failed, and what was dropped."""
+        """Return where each callback may run, how often it was called and failed, and what was dropped."""
         return {
             name: {
                 "kind": registration.kind.name,

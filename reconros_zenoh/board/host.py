@@ -44,8 +44,8 @@ class Overruns:
 class Host:
     """Runs the real computation while the model decides when its result is ready.
 
-    In wall time the computations run in a pool of threads. In virtual time they run in line, and a pure kernel
-    computes equal inputs only once.
+    In wall time the computations run in a pool of threads. In virtual time they run in line, and a pure
+    kernel computes equal inputs only once.
     """
 
     def __init__(self, environment: VirtualEnvironment, threads: int | None) -> None:
@@ -101,7 +101,7 @@ class Host:
 
 
 def _identity(argument: object) -> object:
-    """Return something equal for equal arguments: arrays by shape, type and a 128-bit hash of their content."""
+    """Return something equal for equal arguments: arrays by shape, type and a hash of their content."""
     if isinstance(argument, np.ndarray):
         content = np.ascontiguousarray(argument)
         return argument.shape, argument.dtype.str, xxhash.xxh3_128_digest(content.data.cast("B"))

@@ -53,8 +53,8 @@ class ExecutorSection(_Section):
 class DdsSection(_Section):
     """The ROS 2 communication stack on the cores, per message and direction.
 
-    A message of more than `large_from` costs `per_byte_large`. A large message is resent whole with probability
-    `nack_probability`, `nack_delay` after its first copy.
+    A message of more than `large_from` costs `per_byte_large`. A large message is resent whole with
+    probability `nack_probability`, `nack_delay` after its first copy.
     """
 
     per_message: Duration
@@ -105,8 +105,8 @@ class BitstreamSection(_Section):
 class CallbackSection(_Section):
     """How long a callback takes in isolation.
 
-    `software` is processor time. `compute` is what the slot computes; with the memory transfers and the calls of
-    the hardware thread it adds up to the execution time in hardware.
+    `software` is processor time. `compute` is what the slot computes; with the memory transfers and the calls
+    of the hardware thread it adds up to the execution time in hardware.
     """
 
     software: Duration

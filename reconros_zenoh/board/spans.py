@@ -48,7 +48,7 @@ class Timeline:
     def fork(self) -> Timeline:
         """Return a timeline with the same past: of a message that the callback published."""
         other = Timeline(self._environment, self.started_ns)
-        other._since_ns = self._since_ns  # noqa: SLF001 - the same class
+        other._since_ns = self._since_ns
         other.callback = self.callback
         other.stages_ns.update(self.stages_ns)
         return other

@@ -21,9 +21,9 @@ if TYPE_CHECKING:
 class ZyCAP:
     """The three functions of the ReconROS library: `init`, `write_bitstream`, `deinit`.
 
-    A write takes `t_rc = S / B + t_offset` and, where the profile says so, keeps the communication stack off the
-    cores meanwhile; then the slot settles. There is one ICAP: writes queue for it. `icap` is None where nothing is
-    modelled.
+    A write takes `t_rc = S / B + t_offset` and, where the profile says so, keeps the communication stack off
+    the cores meanwhile; then the slot settles. There is one ICAP: writes queue for it. `icap` is None where
+    nothing is modelled.
     """
 
     def __init__(

@@ -12,9 +12,7 @@ import typer
 from rich.console import Console
 
 from reconros_zenoh.board.control import ask_status
-from reconros_zenoh.errors import UsageError
 from reconros_zenoh.experiments.roundtrip import application_folder
-from reconros_zenoh.measure.record import RecordWriter, RoundTrip
 from reconros_zenoh.transport.zenoh import ZenohRouter, ZenohTransport
 
 _ENDPOINT = "tcp/127.0.0.1:7447"
@@ -51,8 +49,9 @@ def router(
 
 def board(
     project: Annotated[
-        Path, typer.Argument(help="Folder of a ReconROS project.", show_default="the round-trip application")
-    ] = application_folder(),
+        Path | None,
+        typer.Argument(help="Folder of a ReconROS project.", show_default="the round-trip application"),
+    ] = None,
     mapping: Annotated[
         str, typer.Option(metavar="NAME|FILE", help="Which callback runs where.")
     ] = "all_hardware",
@@ -69,19 +68,21 @@ def board(
     ] = None,
 ) -> None:
     """Run an emulated board that hosts a project, until Ctrl-C."""
-    from board_daemon.daemon import run_board  # noqa: PLC0415 - `router` and `status` start without it
-    from board_daemon.hosting import BoardOptions  # noqa: PLC0415
-    from reconros_zenoh.board.profile import read_profile  # noqa: PLC0415
-    from reconros_zenoh.project.loader import load_project  # noqa: PLC0415
+    from board_daemon.daemon import run_board
+    from board_daemon.hosting import BoardOptions
+    from reconros_zenoh.board.profile import read_profile
+    from reconros_zenoh.project.loader import load_project
 
-    loaded = load_project(project)
+    loaded = load_project(project or application_folder())
     run_board(
         router,
         read_profile(profile),
         loaded,
         loaded.mapping(mapping),
         BoardOptions(name, domain, seed, bitstreams),
-        lambda: print(f"board {name} serves {project.name} under {mapping} on {profile}", flush=True),
+        lambda: print(
+            f"board {name} serves {loaded.configuration.name} under {mapping} on {profile}", flush=True
+        ),
     )
 
 
@@ -107,8 +108,8 @@ def client(
     as_json: AsJson = False,
 ) -> None:
     """Make round trips to a board, one after the other, and check every answer."""
-    from host_clients.command import make_round_trips  # noqa: PLC0415 - `router` and `status` start without it
-    from host_clients.daemon import ClientOptions  # noqa: PLC0415
+    from host_clients.command import make_round_trips
+    from host_clients.daemon import ClientOptions
 
     options = ClientOptions(str(name), router, requests, limit, wait, domain, seed, group, members)
     raise typer.Exit(make_round_trips(options, out, as_json=as_json))

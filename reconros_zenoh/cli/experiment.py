@@ -78,7 +78,7 @@ def plan(
     clock: ClockName, mappings: tuple[str, ...] | list[str], requests: int, seed: int, out: Path, profile: str
 ) -> Plan:
     """Return the plan of an experiment; raise UsageError for a mapping or profile that cannot be used."""
-    from reconros_zenoh.board.profile import read_profile  # noqa: PLC0415 - pydantic takes its time
+    from reconros_zenoh.board.profile import read_profile
 
     project = load_project(application_folder())
     named: dict[str, Path] = {}
@@ -103,11 +103,11 @@ def run(plan: Plan, *, quiet: bool) -> dict[str, Any]:
     with ExperimentProgress(plan, quiet=quiet) as progress:
         try:
             if plan.clock == "virtual":
-                from reconros_zenoh.experiments.virtual import run_virtual  # noqa: PLC0415 - loads OpenCV
+                from reconros_zenoh.experiments.virtual import run_virtual
 
                 run_virtual(plan, report, progress.advance)
             else:
-                from reconros_zenoh.experiments.wall import run_wall  # noqa: PLC0415
+                from reconros_zenoh.experiments.wall import run_wall
 
                 run_wall(plan, report, progress.advance)
         except (KeyboardInterrupt, SystemExit):

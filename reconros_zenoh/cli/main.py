@@ -30,8 +30,8 @@ _VERBS = {
 def main() -> None:
     """Run the command of this process's arguments and exit.
 
-    Status 0: it did what was asked; 1: an experiment failed or an answer was wrong; 2: what was given cannot be
-    used; 130 and 143: ended by Ctrl-C and SIGTERM.
+    Status 0: it did what was asked; 1: an experiment failed or an answer was wrong; 2: what was given cannot
+    be used; 130 and 143: ended by Ctrl-C and SIGTERM.
     """
     logging.basicConfig(level=logging.INFO, format="%(levelname)s %(name)s: %(message)s")
     signal.signal(signal.SIGTERM, _end)

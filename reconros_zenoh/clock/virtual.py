@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 
 class VirtualEnvironment(simpy.Environment):
-    """A SimPy environment whose `now` is integer nanoseconds and which takes calls from outside its processes.
+    """A SimPy environment whose `now` is integer nanoseconds and which takes calls from outside.
 
     Deterministic: with the same seed the same events happen in the same order, on any machine.
     """
@@ -30,14 +30,18 @@ class VirtualEnvironment(simpy.Environment):
         return self.now
 
     def post(self, function: Callable[..., object], *arguments: object) -> None:
-        """Have `function(*arguments)` called by the event loop at the present time, after what is due already."""
+        """Have `function(*arguments)` called by the event loop now, after what is due already."""
         self.call_later(0, function, *arguments)
 
     def call_later(self, delay_ns: int, function: Callable[..., object], *arguments: object) -> None:
         """Have `function(*arguments)` called by the event loop after `delay_ns`."""
         timeout = self.timeout(delay_ns)
         assert timeout.callbacks is not None
-        timeout.callbacks.append(lambda _: function(*arguments))
+
+        def call(_: simpy.Event) -> None:
+            function(*arguments)
+
+        timeout.callbacks.append(call)
 
     def step(self) -> None:
         """Process the next event."""

@@ -35,10 +35,10 @@ class Lag:
 class WallEnvironment(VirtualEnvironment):
     """A VirtualEnvironment in which no event happens before its time on the monotonic clock.
 
-    `now` is the due time of the event being processed, so a late event does not delay what follows from it: the
-    model does not drift, the loop catches up. Calls come in from any thread through `post`; everything else
-    belongs to the thread that runs the loop. Between events the loop sleeps; the last tenth of a millisecond it
-    spins, because a sleep ends about that much late.
+    `now` is the due time of the event being processed, so a late event does not delay what follows from it:
+    the model does not drift, the loop catches up. Calls come in from any thread through `post`; everything
+    else belongs to the thread that runs the loop. Between events the loop sleeps; the last tenth of a
+    millisecond it spins, because a sleep ends about that much late.
     """
 
     def __init__(self) -> None:
@@ -51,7 +51,7 @@ class WallEnvironment(VirtualEnvironment):
         return time.monotonic_ns()
 
     def post(self, function: Callable[..., object], *arguments: object) -> None:
-        """Have `function(*arguments)` called by the event loop now; callable from any thread and signal handler."""
+        """Have `function(*arguments)` called by the event loop now; from any thread or signal handler."""
         self._inbox.put((time.monotonic_ns(), function, arguments))
 
     def step(self) -> None:
@@ -95,7 +95,8 @@ class WallEnvironment(VirtualEnvironment):
 def keep_time() -> None:
     """Make this process's threads wake up punctually; called once by a daemon before it starts any thread.
 
-    Linux delays timers by up to 50 us to save wake-ups, and CPython hands the interpreter over every 5 ms only.
+    Linux delays timers by up to 50 us to save wake-ups, and CPython hands the interpreter over every 5 ms
+    only.
     """
     sys.setswitchinterval(0.0005)
     if sys.platform == "linux":

@@ -15,9 +15,9 @@ _WITH_POSITION = (CallbackKind.SUB, CallbackKind.SRV, CallbackKind.CLT)
 class OffsetVector:
     """One worker's `Position` in each list but the timers': the callback it served last.
 
-    A search starts behind `Position`. When it meets the end of the list, `Position` wraps to the beginning and
-    the worker goes on to the next list, so a subscriber that is always ready cannot starve the service servers
-    behind it: between two services of it every other list is looked at once.
+    A search starts behind `Position`. When it meets the end of the list, `Position` wraps to the beginning
+    and the worker goes on to the next list, so a subscriber that is always ready cannot starve the service
+    servers behind it: between two services of it every other list is looked at once.
     """
 
     def __init__(self, lists: CallbackLists) -> None:
@@ -38,9 +38,10 @@ class OffsetVector:
 class ReconrosExecutor:
     """Hands ready callbacks to software and hardware workers, whose number it need not know.
 
-    A worker asks with `select`, runs what it got to completion, and says so with `finish`. Timers come first, in
-    the order of registration; then subscribers, service servers and service clients, each behind the worker's
-    own OffsetVector. No callback runs twice at once and none runs where its ResourceMask has no field.
+    A worker asks with `select`, runs what it got to completion, and says so with `finish`. Timers come first,
+    in the order of registration; then subscribers, service servers and service clients, each behind the
+    worker's own OffsetVector. No callback runs twice at once and none runs where its ResourceMask has no
+    field.
     """
 
     def __init__(self) -> None:

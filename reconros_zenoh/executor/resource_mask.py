@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
 
 SOFTWARE = -1
 """The resource number of the processor cores; slots are numbered from 0."""
@@ -12,14 +16,14 @@ SOFTWARE = -1
 class ResourceMask:
     """A field for software and one for each reconfigurable slot.
 
-    A filled field holds the implementation that a worker of that resource starts: the function of the callback
-    for software, the bitstream for a slot (ReconROS Executor, Section III-B).
+    A filled field holds the implementation that a worker of that resource starts: the function of the
+    callback for software, the bitstream for a slot (ReconROS Executor, Section III-B).
     """
 
     implementations: dict[int, object]
 
     @classmethod
-    def of(cls, *, software: object | None = None, slots: dict[int, object] | None = None) -> ResourceMask:
+    def of(cls, *, software: object | None = None, slots: Mapping[int, object] | None = None) -> ResourceMask:
         """Return the mask with these fields filled; raise ValueError for a negative slot."""
         fields = dict(slots or {})
         if any(slot < 0 for slot in fields):

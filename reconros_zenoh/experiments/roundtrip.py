@@ -71,7 +71,7 @@ class BoardReport:
 
 
 def finish(plan: Plan, report: BoardReport, *, interrupted: bool) -> dict[str, Any]:
-    """Return the experiment's object from what is recorded, and write it as experiment.json beside the records."""
+    """Return the experiment's object, made from the records, and write it as experiment.json."""
     experiment = {
         "experiment": "roundtrip",
         "clock": plan.clock,
@@ -105,7 +105,7 @@ def all_right(experiment: Mapping[str, Any]) -> bool:
 
 
 def prepare(plan: Plan) -> None:
-    """Make the folders of the run and remove what an earlier run of it left; raise UsageError where that fails."""
+    """Make the folders of the run, without what an earlier run left; raise UsageError if that fails."""
     try:
         for mapping in plan.mappings:
             (plan.folder / mapping).mkdir(parents=True, exist_ok=True)

@@ -27,7 +27,8 @@ _LOOK_EVERY_S = 0.2
 def run_wall(plan: Plan, report: BoardReport, on_progress: Callable[[str, str], None]) -> None:
     """Record the round trips of each mapping; `on_progress(mapping, client)` is called after each of them.
 
-    Raise ExperimentError, naming the process and with the end of its log, when one fails; nothing is left running.
+    Raise ExperimentError, naming the process and with the end of its log, when one fails; nothing is left
+    running.
     """
     with as_file(files("deploy") / "roundtrip.yaml") as compose:
         for mapping, path in plan.mappings.items():

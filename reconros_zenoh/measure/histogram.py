@@ -56,8 +56,8 @@ def bin_edges(samples: Sequence[npt.NDArray[np.float64]], bins: int) -> npt.NDAr
     if not ranges:
         return np.array([], dtype=np.float64)
     low, high = float(min(r[0] for r in ranges)), float(max(r[1] for r in ranges))
-    if high - low <= high * 1e-9:
-        # All values alike: a range around them, wide enough for the edges to differ.
+    if high - low <= max(1e-6, high * 1e-9):
+        # All values alike to a nanosecond: a range around them, wide enough for the edges to differ.
         margin = max(0.5, high * 1e-6)
         low, high = max(0.0, low - margin), high + margin
     return np.linspace(low, high, bins + 1)
@@ -149,7 +149,9 @@ def _bars(console: Console, shown: list[NamedRecord], edges_ms: npt.NDArray[np.f
         int(np.searchsorted(edges_ms, v.mean(), side="right")) - 1 if v.size else -1 for v in samples
     ]
 
-    lines = [Text(_FROM.rjust(label_width) + "share".rjust(width + _SHARE_WIDTH) * len(shown), style="dim")]
+    lines = [
+        Text(_FROM.rjust(label_width) + "share".rjust(2 + width + _SHARE_WIDTH) * len(shown), style="dim")
+    ]
     for index, label in enumerate(labels):
         line = Text(label.rjust(label_width))
         for share in shares:

@@ -95,7 +95,8 @@ class Application:
         except KeyError:
             known = ", ".join(f"{group}.{name}" for group, name in self._resources)
             raise UsageError(
-                f"{self.project.configuration.path} has no resource {name!r} in a group {group!r}. It has {known}."
+                f"{self.project.configuration.path} has no resource {name!r} in a group {group!r}. "
+                f"It has {known}."
             ) from None
 
     def _node(self, resource: Resource) -> Node:

@@ -21,8 +21,8 @@ class Responder(Protocol):
 class Received(NamedTuple):
     """A decoded message, the bytes it had on the wire, and how long it was on its way.
 
-    `transit_ns` is the present time of the context's clock minus the source timestamp: between hosts it is only
-    as good as their clocks agree. `responder` is None but for a request.
+    `transit_ns` is the present time of the context's clock minus the source timestamp: between hosts it is
+    only as good as their clocks agree. `responder` is None but for a request.
     """
 
     message: Any

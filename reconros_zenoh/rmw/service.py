@@ -38,8 +38,8 @@ class _Response:
 class Service(Endpoint):
     """Hands the requests of one service to `sink`, decoded, on a thread of the transport.
 
-    A bad request is counted and logged by the context, and its sender gets an error reply that says why. `check`
-    is as for a Subscription.
+    A bad request is counted and logged by the context, and its sender gets an error reply that says why.
+    `check` is as for a Subscription.
     """
 
     def __init__(

@@ -23,8 +23,9 @@ class Subscription(Endpoint):
     """Hands the messages of one topic to `sink`, decoded, on a thread of the transport.
 
     `check`, when given, raises BadMessageError for a message that its receiver cannot use. Bad messages are
-    counted and logged by the context; `sink` never sees them. The key expression leaves domain and type hash open,
-    so that a publisher in another domain or with another version of the type is noticed rather than never heard.
+    counted and logged by the context; `sink` never sees them. The key expression leaves domain and type hash
+    open, so that a publisher in another domain or with another version of the type is noticed rather than
+    never heard.
     """
 
     def __init__(

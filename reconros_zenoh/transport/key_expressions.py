@@ -33,18 +33,29 @@ def intersects(left: str, right: str) -> bool:
     return left == right or _meet(left.split("/"), right.split("/"), "**", _chunks_meet)
 
 
+def includes(wide: str, narrow: str) -> bool:
+    """Whether every key of `narrow` belongs to `wide`; for a `narrow` without wildcards: whether it does."""
+    return wide == narrow or _cover(wide.split("/"), narrow.split("/"), "**", _chunk_covers)
+
+
 def _chunks_meet(left: str, right: str) -> bool:
-    if left == right:
+    if left == right or _is_any(left, right) or _is_any(right, left):
         return True
     if left.startswith("@") or right.startswith("@"):
         return False
-    if left in {"*", "**"} or right in {"*", "**"}:
+    return _meet(_GLYPH.findall(left), _GLYPH.findall(right), "$*", lambda a, b: a == b or "$*" in {a, b})
+
+
+def _chunk_covers(wide: str, narrow: str) -> bool:
+    if wide == narrow or _is_any(wide, narrow):
         return True
-    return _meet(_GLYPH.findall(left), _GLYPH.findall(right), "$*", _glyphs_meet)
+    if wide.startswith("@") or narrow.startswith("@") or narrow == "*":
+        return False
+    return _cover(_GLYPH.findall(wide), _GLYPH.findall(narrow), "$*", lambda a, b: a in {b, "$*"})
 
 
-def _glyphs_meet(left: str, right: str) -> bool:
-    return left == right or "$*" in {left, right}
+def _is_any(wide: str, narrow: str) -> bool:
+    return wide in {"*", "**"} and not narrow.startswith("@")
 
 
 def _meet(left: Sequence[str], right: Sequence[str], many: str, one: Callable[[str, str], bool]) -> bool:
@@ -52,9 +63,21 @@ def _meet(left: Sequence[str], right: Sequence[str], many: str, one: Callable[[s
     if not left or not right:
         return all(element == many for element in (*left, *right))
     if left[0] == many:
-        return _meet(left[1:], right, many, one) or (
-            one(many, right[0]) and _meet(left, right[1:], many, one)
-        )
+        more = one(many, right[0]) and _meet(left, right[1:], many, one)
+        return more or _meet(left[1:], right, many, one)
     if right[0] == many:
         return _meet(right, left, many, one)
     return one(left[0], right[0]) and _meet(left[1:], right[1:], many, one)
+
+
+def _cover(wide: Sequence[str], narrow: Sequence[str], many: str, one: Callable[[str, str], bool]) -> bool:
+    """Whether `wide` can stand for whatever `narrow` stands for; `many` as above."""
+    if not wide:
+        return not narrow
+    if wide[0] == many and _cover(wide[1:], narrow, many, one):
+        return True
+    if not narrow or not one(wide[0], narrow[0]):
+        return False
+    if wide[0] == many:
+        return _cover(wide, narrow[1:], many, one)
+    return narrow[0] != many and _cover(wide[1:], narrow[1:], many, one)

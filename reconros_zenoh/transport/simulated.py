@@ -12,7 +12,7 @@ from reconros_zenoh.errors import TransportError
 from reconros_zenoh.ros.qos import Durability
 from reconros_zenoh.transport.base import Reply
 from reconros_zenoh.transport.guard import Closing, GuardedDeclaration
-from reconros_zenoh.transport.key_expressions import check_key, intersects
+from reconros_zenoh.transport.key_expressions import check_key, includes, intersects
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -277,14 +277,15 @@ class _Querier(_Matcher):
 
     def find_route(self) -> None:
         """Know the present servers of this key."""
-        self._route = tuple(s for s in self.network.servers if intersects(s.key, self.key))
+        self._route = tuple(s for s in self.network.servers if includes(s.key, self.key))
         self.tell_matching(bool(self._route))
 
     def get(self, parts: Parts, attachment: bytes | None, on_reply: OnReply, timeout_ns: int) -> None:
         self.check_open()
         exchange = _Exchange(self, on_reply, len(self._route))
         for server in self._route:
-            server.post(server.sink, _Request(server.key, attachment, parts, exchange))
+            key = self.key if "*" in server.key else server.key
+            server.post(server.sink, _Request(key, attachment, parts, exchange))
         # Without a server it is over at once, but never from within this call.
         self.network.environment.call_later(timeout_ns if self._route else 0, exchange.finish)
 
@@ -304,7 +305,7 @@ class _Server(_Declaration):
 
     def _tell_queriers(self) -> None:
         for querier in self.network.queriers:
-            if intersects(querier.key, self.key):
+            if includes(self.key, querier.key):
                 querier.find_route()
 
     def _withdraw(self) -> None:

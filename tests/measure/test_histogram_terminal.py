@@ -37,7 +37,7 @@ TWICE = [2 * value for value in VALUES]
 def test_golden_histogram():
     assert shown(entry(VALUES), None, 3) == [
         "mixed/sort",
-        "from ms                                               share",
+        "from ms                                                share",
         "    1.0  ███████████████████████████████████████████  50.0 %",
         "    2.0  █████████████████████▌                       25.0 %",
         "   mean  ╌╌╌╌╌╌╌╌╌╌╌╌╌╌╌╌╌╌╌╌╌╌╌╌╌╌╌╌╌╌╌╌╌╌╌╌╌╌╌╌╌╌╌   2.06",
@@ -51,7 +51,7 @@ def test_golden_histogram():
 
 def test_golden_histogram_in_ascii():
     assert shown(entry(VALUES), None, 3, encoding="ascii")[1:6] == [
-        "from ms                                               share",
+        "from ms                                                share",
         "    1.0  ###########################################  50.0 %",
         "    2.0  ######################                       25.0 %",
         "   mean  -------------------------------------------   2.06",
@@ -62,10 +62,10 @@ def test_golden_histogram_in_ascii():
 def test_golden_comparison():
     assert shown(entry(VALUES), entry(TWICE, "all_hardware/sort"), 2, width=70) == [
         "mixed/sort | all_hardware/sort",
-        "from ms                         share                         share",
+        "from ms                          share                          share",
         "    1.0  █████████████████████ 100.0 %  ██████████▌            50.0 %",
         "   mean  ╌╌╌╌╌╌╌╌╌╌╌╌╌╌╌╌╌╌╌╌╌   2.06   ╌╌╌╌╌╌╌╌╌╌╌╌╌╌╌╌╌╌╌╌╌   4.12",
-        "    4.5                         0.0 %  ██████████▌            50.0 %",
+        "    4.5                          0.0 %  ██████████▌            50.0 %",
         "times in ms        n lost wrong mean  p50  p90  p99 p99.9  max",
         "mixed/sort        16    0     0 2.06 1.75 3.75 4.00  4.00 4.00",
         "all_hardware/sort 16    0     0 4.12 3.50 7.50 8.00  8.00 8.00",
@@ -112,7 +112,23 @@ def test_a_client_without_answers_says_so():
 def test_the_description_agrees_with_numpy():
     ours, theirs = np.linspace(1, 5, 101), np.linspace(2, 6, 101)
     described = describe(entry(ours), entry(theirs, "b/sort", lost=2), 10)
-    names = "name path n lost wrong mean_ms p50_ms p90_ms p99_ms p999_ms max_ms bins_ms counts below above".split()
+    names = [
+        "name",
+        "path",
+        "n",
+        "lost",
+        "wrong",
+        "mean_ms",
+        "p50_ms",
+        "p90_ms",
+        "p99_ms",
+        "p999_ms",
+        "max_ms",
+        "bins_ms",
+        "counts",
+        "below",
+        "above",
+    ]
     assert list(described) == [*names, "compare"]
     assert list(described["compare"]) == [*names, "median_ratio"]
     assert described["p999_ms"] == np.percentile(ours, 99.9)

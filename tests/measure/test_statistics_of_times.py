@@ -7,7 +7,19 @@ from hypothesis import strategies as st
 
 from reconros_zenoh.measure.statistics import format_error, format_ms, format_speedup, summarise
 
-NAMES = "n lost wrong mean_ms p5_ms p25_ms median_ms p75_ms p95_ms p99_ms max_ms".split()
+NAMES = [
+    "n",
+    "lost",
+    "wrong",
+    "mean_ms",
+    "p5_ms",
+    "p25_ms",
+    "median_ms",
+    "p75_ms",
+    "p95_ms",
+    "p99_ms",
+    "max_ms",
+]
 
 
 @given(st.lists(st.floats(0, 1e5), min_size=1), st.integers(0, 9), st.integers(0, 9))

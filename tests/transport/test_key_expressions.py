@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from reconros_zenoh.errors import TransportError
-from reconros_zenoh.transport.key_expressions import check_key, intersects
+from reconros_zenoh.transport.key_expressions import check_key, includes, intersects
 
 CHUNKS = ["a", "b", "ab", "*", "**", "$*a", "a$*", "a$*b", "b$*a$*", "@a", "@ab", "%chatter"]
 expressions = st.lists(st.sampled_from(CHUNKS), min_size=1, max_size=5).map(
@@ -17,6 +17,11 @@ expressions = st.lists(st.sampled_from(CHUNKS), min_size=1, max_size=5).map(
 @given(expressions, expressions)
 def test_intersects_as_zenoh_does(left: str, right: str) -> None:
     assert intersects(left, right) == zenoh.KeyExpr(left).intersects(zenoh.KeyExpr(right))
+
+
+@given(expressions, expressions)
+def test_includes_as_zenoh_does(wide: str, narrow: str) -> None:
+    assert includes(wide, narrow) == zenoh.KeyExpr(wide).includes(zenoh.KeyExpr(narrow))
 
 
 @given(st.text("ab*$/@?#", max_size=8))

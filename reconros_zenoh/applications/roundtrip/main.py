@@ -22,7 +22,7 @@ def main(app: Application) -> None:
     executor = Executor(
         app.board, mapping.software_workers, mapping.hardware_workers, app.bitstreams, mapping.executor
     )
-    callbacks = {
+    callbacks: dict[str, tuple[CallbackKind, str, Inverse | Mnist | Sobel | Sort | Hash]] = {
         "inverse": (CallbackKind.SUB, "sub", Inverse(app.writer("inverse", "pub"))),
         "mnist": (CallbackKind.SUB, "sub", Mnist(app.writer("mnist", "pub"))),
         "sobel": (CallbackKind.SUB, "sub", Sobel(app.writer("sobel", "pub"))),

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from reconros_zenoh.applications.roundtrip.kernels.sobel import SHAPE, sobel
 from reconros_zenoh.errors import BadMessageError
 
 if TYPE_CHECKING:
     from collections.abc import Generator
 
+    import numpy as np
     import simpy
     from numpy.typing import NDArray
 
