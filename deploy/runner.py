@@ -183,11 +183,12 @@ class LocalRunner:
         while True:
             living = [run for run in self._runs.values() if run.living]
             needed = {name for run in living for name in run.service.depends_on}
+            impatient = self._signals.count > 1
             for name, run in self._runs.items():
-                if self._signals.count > 1:
-                    run.kill()
-                elif name not in needed:
+                if impatient or name not in needed:
                     run.stop(self._stop_limit_ns)
+                if impatient:
+                    run.kill()
             if not living:
                 return
             self._wait()

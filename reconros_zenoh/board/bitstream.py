@@ -13,8 +13,10 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
     from pathlib import Path
 
-# magic, slot, length of the callback's name, size of the whole file, CRC-32 of name and body
-_HEADER = struct.Struct("<8sHHQI")
+# magic, slot, length of the callback's name, size of the whole file; then the CRC-32 of all but itself
+_HEADER = struct.Struct("<8sHHQ")
+_CRC = struct.Struct("<I")
+_NAME_AT = _HEADER.size + _CRC.size
 _MAGIC = b"RRZBIT01"
 _REBUILD = "Write it again with `reconros build`."
 
@@ -36,14 +38,15 @@ class Bitstream:
         """Write the file and return its path; the body is a hole of zeros, so it takes no disk space."""
         path = folder / self.file_name
         name = self.callback.encode()
-        body = self.size - _HEADER.size - len(name)
+        body = self.size - _NAME_AT - len(name)
         if body < 0:
             raise UsageError(f"a bitstream of {self.size} bytes has no room for its header: {self.file_name}")
-        crc = zlib.crc32(bytes(body), zlib.crc32(name))
+        header = _HEADER.pack(_MAGIC, self.slot, len(name), self.size)
+        crc = zlib.crc32(bytes(body), zlib.crc32(header + name))
         try:
             folder.mkdir(parents=True, exist_ok=True)
             with path.open("wb") as file:
-                file.write(_HEADER.pack(_MAGIC, self.slot, len(name), self.size, crc) + name)
+                file.write(header + _CRC.pack(crc) + name)
                 file.truncate(self.size)
         except OSError as error:
             raise UsageError(f"{path} cannot be written ({error.strerror}). Choose another folder.") from None
@@ -56,14 +59,15 @@ class Bitstream:
             content = path.read_bytes()
         except OSError as error:
             raise BitstreamError(path, None, f"cannot be read ({error.strerror}).", _REBUILD) from None
-        if len(content) < _HEADER.size or not content.startswith(_MAGIC):
+        if len(content) < _NAME_AT or not content.startswith(_MAGIC):
             raise BitstreamError(path, None, "is not a bitstream of this project.", _REBUILD)
-        _, slot, name_length, size, crc = _HEADER.unpack_from(content)
+        _, slot, name_length, size = _HEADER.unpack_from(content)
         if size != len(content):
             raise BitstreamError(path, None, f"has {len(content)} bytes instead of {size}.", _REBUILD)
-        if zlib.crc32(memoryview(content)[_HEADER.size :]) != crc:
+        crc = zlib.crc32(memoryview(content)[_NAME_AT:], zlib.crc32(content[: _HEADER.size]))
+        if _CRC.unpack_from(content, _HEADER.size) != (crc,):
             raise BitstreamError(path, None, "is damaged (CRC-32 differs).", _REBUILD)
-        return cls(slot, content[_HEADER.size : _HEADER.size + name_length].decode(), size)
+        return cls(slot, content[_NAME_AT : _NAME_AT + name_length].decode(), size)
 
 
 def read_bitstreams(folder: Path, wanted: Iterable[Bitstream]) -> Mapping[tuple[int, str], Bitstream]:

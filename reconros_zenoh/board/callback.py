@@ -108,7 +108,7 @@ class HardwareThread:
 
     def compute(self, kernel: Callable[..., R], *arguments: object) -> Generator[simpy.Event, object, R]:
         """Return `kernel(*arguments)` of a pure kernel when the slot has computed it."""
-        future: Future[R] = self._host.start(self._host.compute, kernel, *arguments)
+        future: Future[R] = self._host.start(kernel, self._host.compute, kernel, *arguments)
         if self._compute_ns is None:
             result = yield from self._host.result(future)
             self._timeline.mark("execution")

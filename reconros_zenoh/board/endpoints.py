@@ -64,7 +64,7 @@ class Reader:
     def __init__(self, board: Board, depth: int) -> None:
         self._board = board
         self._queue: deque[Event] = deque(maxlen=depth)
-        self._stream: Stream[tuple[Received, Timeline]] = Stream(board.environment, self._receive, depth)
+        self._stream: Stream[tuple[Received, Timeline]] = Stream(self._receive, depth)
         self._overwritten = 0
         self._on_ready: Callable[[], None] = lambda: None
 
@@ -202,7 +202,7 @@ class Writer:
 
     def __init__(self, board: Board, depth: int) -> None:
         self._board = board
-        self._stream: Stream[_Outgoing] = Stream(board.environment, self._send, depth)
+        self._stream: Stream[_Outgoing] = Stream(self._send, depth)
 
     @property
     def dropped(self) -> int:
@@ -215,7 +215,8 @@ class Writer:
 
     def _send(self, outgoing: _Outgoing) -> Generator[simpy.Event, object, None]:
         yield from self._board.dds.send(outgoing.size, outgoing.timeline)
-        outgoing.send()
+        # A large message is copied into the transport: not by the thread that keeps the clock.
+        yield from self._board.host.result(self._board.host.start(self, outgoing.send))
         self._board.spans.add(outgoing.timeline)
 
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import time
 from collections import OrderedDict
-from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 import xxhash
@@ -19,18 +20,8 @@ if TYPE_CHECKING:
 
 R = TypeVar("R")
 _RESULTS_KEPT = 512
-
-
-class _Inline(Executor):
-    """Runs what it is given at once, in the caller's thread."""
-
-    def submit(self, function: Callable[..., R], /, *arguments: Any, **keywords: Any) -> Future[R]:
-        future: Future[R] = Future()
-        try:
-            future.set_result(function(*arguments, **keywords))
-        except Exception as error:  # noqa: BLE001 - handed to whoever asks for the result
-            future.set_exception(error)
-        return future
+_IN_LINE_NS = 100_000
+"""About what it costs to hand a computation to another thread and its result back."""
 
 
 @dataclass(slots=True)
@@ -44,23 +35,30 @@ class Overruns:
 class Host:
     """Runs the real computation while the model decides when its result is ready.
 
-    In wall time the computations run in a pool of threads. In virtual time they run in line, and a pure
-    kernel computes equal inputs only once.
+    In wall time what takes long runs in a pool of threads, and what is known to be over sooner than a thread could
+    be woken runs in line. In virtual time everything runs in line, and a pure kernel computes equal inputs once.
     """
 
     def __init__(self, environment: VirtualEnvironment, threads: int | None) -> None:
         """`threads` is the size of the pool, None in virtual time."""
         self._environment = environment
-        self._pool: Executor = (
-            _Inline() if threads is None else ThreadPoolExecutor(threads, thread_name_prefix="callback")
+        self._pool = (
+            None if threads is None else ThreadPoolExecutor(threads, thread_name_prefix="computation")
         )
-        self._remembers = threads is None
+        self._expected_ns: dict[object, float] = {}
         self._results: OrderedDict[object, object] = OrderedDict()
         self.overruns = Overruns()
 
-    def start(self, function: Callable[..., R], *arguments: object) -> Future[R]:
-        """Start a computation and return its future."""
-        return self._pool.submit(function, *arguments)
+    def start(self, task: object, function: Callable[..., R], *arguments: object) -> Future[R]:
+        """Start a computation and return its future; `task` names what tends to take equally long."""
+        if self._pool is not None and self._expected_ns.get(task, _IN_LINE_NS) >= _IN_LINE_NS:
+            return self._pool.submit(self._timed, task, function, *arguments)
+        future: Future[R] = Future()
+        try:
+            future.set_result(self._timed(task, function, *arguments))
+        except Exception as error:  # noqa: BLE001 - handed to whoever asks for the result
+            future.set_exception(error)
+        return future
 
     def result(self, future: Future[R]) -> Generator[simpy.Event, object, R]:
         """Return the result of a started computation once it is there; raises what it raised."""
@@ -83,7 +81,7 @@ class Host:
 
     def compute(self, kernel: Callable[..., R], *arguments: object) -> R:
         """Return `kernel(*arguments)` of a pure kernel; called in the thread of a started computation."""
-        if not self._remembers:
+        if self._pool is not None:
             return kernel(*arguments)
         key = (kernel, *(_identity(argument) for argument in arguments))
         if key in self._results:
@@ -97,12 +95,22 @@ class Host:
 
     def close(self) -> None:
         """Let running computations end and start no other."""
-        self._pool.shutdown(wait=True, cancel_futures=True)
+        if self._pool is not None:
+            self._pool.shutdown(wait=True, cancel_futures=True)
+
+    def _timed(self, task: object, function: Callable[..., R], *arguments: object) -> R:
+        started_ns = time.perf_counter_ns()
+        try:
+            return function(*arguments)
+        finally:
+            took_ns = time.perf_counter_ns() - started_ns
+            expected_ns = self._expected_ns.get(task, took_ns)
+            self._expected_ns[task] = expected_ns + (took_ns - expected_ns) / 8
 
 
 def _identity(argument: object) -> object:
     """Return something equal for equal arguments: arrays by shape, type and a hash of their content."""
     if isinstance(argument, np.ndarray):
         content = np.ascontiguousarray(argument)
-        return argument.shape, argument.dtype.str, xxhash.xxh3_128_digest(content.data.cast("B"))
+        return argument.shape, argument.dtype.str, xxhash.xxh3_128_digest(content.data)
     return argument

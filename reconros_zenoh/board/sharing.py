@@ -62,12 +62,18 @@ class SharedResource:
         self._share()
 
     def _advance(self) -> None:
-        """Account for the work done since the shares last changed."""
+        """Account for the work done since the shares last changed; whoever is through leaves."""
         elapsed_ns = self._environment.now - self._since_ns
         self._since_ns = self._environment.now
-        if elapsed_ns:
-            for job in self._jobs:
-                job.remaining -= job.rate * elapsed_ns
+        if not elapsed_ns:
+            return
+        for job in self._jobs:
+            job.remaining -= job.rate * elapsed_ns
+        # Whole nanoseconds: what is left of the last one counts as done.
+        finished = [job for job in self._jobs if job.remaining < job.rate]
+        self._jobs = [job for job in self._jobs if job.remaining >= job.rate]
+        for job in finished:
+            job.done.succeed()
 
     def _share(self) -> None:
         """Give every job its rate and plan the next completion."""
@@ -85,15 +91,9 @@ class SharedResource:
             left -= rate * len(group)
         delays = [job.remaining / job.rate for job in self._jobs if job.rate > 0]
         if delays:
-            self._environment.call_later(max(0, math.ceil(min(delays))), self._complete, self._plan)
+            self._environment.call_later(max(1, math.ceil(min(delays))), self._complete, self._plan)
 
     def _complete(self, plan: int) -> None:
-        if plan != self._plan:
-            return  # the shares have changed since
-        self._advance()
-        # Whole nanoseconds: what is left of the last one counts as done.
-        finished = [job for job in self._jobs if job.remaining < job.rate]
-        self._jobs = [job for job in self._jobs if job.remaining >= job.rate]
-        for job in finished:
-            job.done.succeed()
-        self._share()
+        if plan == self._plan:  # else the shares have changed since
+            self._advance()
+            self._share()

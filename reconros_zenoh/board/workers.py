@@ -6,6 +6,7 @@ from abc import ABC, abstractmethod
 from typing import TYPE_CHECKING, cast
 
 from reconros_zenoh.board.callback import HardwareThread, SoftwareContext
+from reconros_zenoh.clock.activity import Activity
 from reconros_zenoh.executor.resource_mask import SOFTWARE
 
 if TYPE_CHECKING:
@@ -33,16 +34,14 @@ class Worker(ABC):
         self._environment = executor.board.environment
         self._resource = resource
         self._poll_ns = poll_ns
-        self._idle: simpy.Event | None = None
-        self._environment.process(self._run())
+        self._activity = Activity(self._run())
 
     def wake(self, entry: CallbackEntry) -> None:
         """Say that the callback of this entry may have become ready."""
-        if self._idle is not None and self._resource in entry.mask:
-            self._idle.succeed()
-            self._idle = None
+        if self._resource in entry.mask:
+            self._activity.resume()
 
-    def _run(self) -> Generator[simpy.Event, object, None]:
+    def _run(self) -> Generator[simpy.Event | None, object, None]:
         while True:
             dispatch = self._executor.select(self, self._resource)
             if dispatch is None:
@@ -56,11 +55,10 @@ class Worker(ABC):
             else:
                 self._executor.complete(dispatch, event, response)
 
-    def _wait(self) -> Generator[simpy.Event, object, Dispatch]:
+    def _wait(self) -> Generator[simpy.Event | None, object, Dispatch]:
         idle_since_ns = self._environment.now
         while True:
-            self._idle = self._environment.event()
-            yield self._idle
+            yield None
             if self._poll_ns:
                 missed_ns = (self._environment.now - idle_since_ns) % self._poll_ns
                 if missed_ns:
@@ -86,7 +84,7 @@ class SoftwareWorker(Worker):
         timeline.mark("dispatch")
         context = SoftwareContext(board.host)
         callback = cast("SoftwareCallback", dispatch.implementation)
-        future = board.host.start(callback, event.message, context)
+        future = board.host.start(callback, callback, event.message, context)
         core_time_ns = self._executor.software_ns(dispatch.entry.name)
         if core_time_ns is None:
             response = yield from board.host.result(future)

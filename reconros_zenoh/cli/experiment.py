@@ -74,6 +74,24 @@ def roundtrip(
     raise typer.Exit(0 if all_right(experiment) else 1)
 
 
+@app.command("callbacks")
+def callbacks(
+    accuracy: Annotated[
+        Path, typer.Option(metavar="DIGITS.npz", help="Digits (images, labels) to classify.")
+    ],
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
+) -> None:
+    """Check the MNIST classifier: the share of digits that it classifies as labelled."""
+    from reconros_zenoh.applications.roundtrip.kernels import mnist  # loads OpenCV
+
+    images, labels = mnist.load_digits(accuracy)
+    share = mnist.accuracy(images, labels)
+    if as_json:
+        print(json.dumps({"digits": len(labels), "accuracy": share}))
+    else:
+        print(f"{share:.2%} of {len(labels)} digits classified as labelled")
+
+
 def plan(
     clock: ClockName, mappings: tuple[str, ...] | list[str], requests: int, seed: int, out: Path, profile: str
 ) -> Plan:

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import ctypes
 import sys
+import threading
 import time
 from collections import deque
 from dataclasses import dataclass
 from queue import Empty, SimpleQueue
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
+import simpy
 
 from reconros_zenoh.clock.virtual import VirtualEnvironment
 
@@ -18,6 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
 _SPIN_NS = 100_000
+_TURN_NS = 1_000_000
 _PR_SET_TIMERSLACK = 29
 _LAGS_KEPT = 1 << 16
 
@@ -35,15 +38,23 @@ class Lag:
 class WallEnvironment(VirtualEnvironment):
     """A VirtualEnvironment in which no event happens before its time on the monotonic clock.
 
-    `now` is the due time of the event being processed, so a late event does not delay what follows from it:
-    the model does not drift, the loop catches up. Calls come in from any thread through `post`; everything
-    else belongs to the thread that runs the loop. Between events the loop sleeps; the last tenth of a
-    millisecond it spins, because a sleep ends about that much late.
+    `now` is the due time of what is being done, so a late event does not delay what follows from it: the model
+    does not drift, the loop catches up. Calls come in from any thread through `post`.
+
+    The loop belongs to whoever has the turn. The thread in `run` takes it when the next event is due: it sleeps until
+    then, the last tenth of a millisecond it spins, because a sleep ends about that much late. A thread that posts
+    takes the turn itself when it is free and does what is due, for to wake another thread takes longer than most
+    messages do. Before `run` and after it nobody has the turn: posted calls wait.
     """
 
     def __init__(self) -> None:
         super().__init__(time.monotonic_ns())
-        self._inbox: SimpleQueue[tuple[int, Callable[..., object], tuple[object, ...]]] = SimpleQueue()
+        self._inbox: deque[tuple[int, Callable[..., object], tuple[object, ...]]] = deque()
+        self._turn = threading.Lock()
+        self._turn.acquire()
+        self._alarm: SimpleQueue[None] = SimpleQueue()
+        self._asleep_until: float = -1
+        self._failure: BaseException | None = None
         self._lags_ns: deque[int] = deque(maxlen=_LAGS_KEPT)
 
     def clock_ns(self) -> int:
@@ -52,31 +63,40 @@ class WallEnvironment(VirtualEnvironment):
 
     def post(self, function: Callable[..., object], *arguments: object) -> None:
         """Have `function(*arguments)` called by the event loop now; from any thread or signal handler."""
-        self._inbox.put((time.monotonic_ns(), function, arguments))
-
-    def step(self) -> None:
-        """Wait until the next event is due, then process it."""
-        inbox = self._inbox
-        while True:
-            while not inbox.empty():
-                self._schedule_posted(*inbox.get())
-            due = self.peek()
-            early_ns = due - time.monotonic_ns()
-            if early_ns <= 0:
-                break
-            if early_ns <= _SPIN_NS:
-                time.sleep(0)  # lets other threads have the interpreter
-                continue
+        self._inbox.append((time.monotonic_ns(), function, arguments))
+        # Once more after each turn: another thread may have posted while it could not take the turn.
+        while self._inbox and self._turn.acquire(blocking=False):
             try:
-                # Without an event ahead (due is infinite) only a posted call can end the wait.
-                timeout_s = None if early_ns == float("inf") else (early_ns - _SPIN_NS) / 1e9
-                self._schedule_posted(*inbox.get(timeout=timeout_s))
-            except Empty:
-                pass
-        # Events of the same instant follow from its first one: one lag for all.
-        if due > self._now:
-            self._lags_ns.append(int(-early_ns))
-        super().step()
+                next_due = self._catch_up(time.monotonic_ns() + _TURN_NS)
+            except BaseException as error:  # noqa: BLE001 - raised again by `run`
+                self._failure = error
+                next_due = -1
+            finally:
+                self._turn.release()
+            if next_due < self._asleep_until:
+                self._asleep_until = -1
+                self._alarm.put(None)
+                return
+
+    def run(self, until: simpy.Event) -> Any:  # type: ignore[override] # only until an event
+        """Keep the loop going until the event has happened, and return its value; raise what it failed with."""
+        if until.callbacks is not None:
+            # It may happen in another thread's turn.
+            until.callbacks.append(lambda _: self._alarm.put(None))
+        self._turn.release()
+        try:
+            while not until.processed:
+                with self._turn:
+                    next_due = self._catch_up(float("inf"))
+                if not until.processed:
+                    self._sleep(next_due)
+                if self._failure is not None:
+                    raise self._failure
+        finally:
+            self._turn.acquire()
+        if not until.ok:
+            raise cast("BaseException", until.value)
+        return until.value
 
     def lag(self) -> Lag:
         """Return how late the loop was over the last events that had a time of their own."""
@@ -86,17 +106,51 @@ class WallEnvironment(VirtualEnvironment):
         p50, p99 = np.percentile(lags, (50, 99)) / 1e3
         return Lag(len(lags), float(p50), float(p99), float(lags.max()) / 1e3)
 
-    def _schedule_posted(
-        self, posted_ns: int, function: Callable[..., object], arguments: tuple[object, ...]
-    ) -> None:
-        self.call_later(max(0, posted_ns - self.now), function, *arguments)
+    def _catch_up(self, deadline_ns: float) -> float:
+        """Do what is due, in the order of time, and return when the next event is; called with the turn.
+
+        At the deadline it stops with work left, and returns a time that has passed.
+        """
+        while True:
+            due = self.peek()
+            if self._inbox and self._inbox[0][0] <= due:
+                posted_ns, function, arguments = self._inbox.popleft()
+                self._now = max(self._now, posted_ns)
+                function(*arguments)
+                continue
+            late_ns = time.monotonic_ns() - due
+            if late_ns < 0 or due + late_ns > deadline_ns:
+                return due
+            # Events of the same instant follow from its first one: one lag for all.
+            if due > self._now:
+                self._lags_ns.append(int(late_ns))
+            self.step()
+
+    def _sleep(self, until_ns: float) -> None:
+        """Return at the time, or when there is something to do before it."""
+        while not self._inbox:
+            early_ns = until_ns - time.monotonic_ns()
+            if early_ns <= 0:
+                return
+            if early_ns <= _SPIN_NS:
+                time.sleep(0)  # lets other threads have the interpreter
+                continue
+            self._asleep_until = until_ns
+            # A thread whose turn ended before the line above could not see how long we sleep.
+            if self.peek() < until_ns:
+                return
+            try:
+                # Without an event ahead only an alarm can end the sleep.
+                self._alarm.get(timeout=None if early_ns == float("inf") else (early_ns - _SPIN_NS) / 1e9)
+            except Empty:
+                continue
+            return
 
 
 def keep_time() -> None:
     """Make this process's threads wake up punctually; called once by a daemon before it starts any thread.
 
-    Linux delays timers by up to 50 us to save wake-ups, and CPython hands the interpreter over every 5 ms
-    only.
+    Linux delays timers by up to 50 us to save wake-ups, and CPython hands the interpreter over every 5 ms only.
     """
     sys.setswitchinterval(0.0005)
     if sys.platform == "linux":

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import json
+import os
 import platform
+import shlex
+import sys
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from importlib.metadata import version
@@ -62,6 +65,7 @@ class BoardReport:
         """Return the overruns of all mappings together and the worst lag."""
         hosts = [status["host"] for status in self.statuses.values()]
         return {
+            "machine": f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores",
             "overruns": sum(host["overruns"] for host in hosts),
             **{
                 key: max((host[key] for host in hosts if host[key] is not None), default=None)
@@ -83,9 +87,12 @@ def finish(plan: Plan, report: BoardReport, *, interrupted: bool) -> dict[str, A
         "rejected": {mapping: status["rejected"] for mapping, status in report.statuses.items()},
         "interrupted": interrupted,
         "profile": plan.profile,
-        "version": version("reconros-zenoh"),
         "date": datetime.now(UTC).isoformat(timespec="seconds"),
-        "machine": f"{platform.system()} {platform.machine()}, Python {platform.python_version()}",
+        "command": shlex.join(["reconros", *sys.argv[1:]]),
+        "versions": {
+            "Python": platform.python_version(),
+            **{name: version(name) for name in ("reconros-zenoh", "eclipse-zenoh", "simpy", "numpy")},
+        },
     }
     path = plan.folder / "experiment.json"
     try:

@@ -25,7 +25,8 @@ LOGGED_MODULO_MS = 1000.0
 GOOD_ERROR = 0.10
 """A median this close to the real board's counts as met; the board repeats its own within 6 %."""
 
-FAIR_ERROR = 0.25
+_FAIR_ERROR = 0.25
+_STYLES = {"good": "green", "fair": "yellow", "bad": "red", "": ""}
 
 MODULO_NOTE = (
     "For the error against the real board our times are taken modulo 1 s, as the paper's clients logged "
@@ -71,7 +72,7 @@ def print_tables(console: Console, experiment: Mapping[str, Any]) -> None:
                 Text(str(cell["lost"]), style="red" if cell["lost"] else ""),
                 Text(str(cell["wrong"]), style="red" if cell["wrong"] else ""),
                 *(format_ms(cell[key]) for key in ("median_ms", "p95_ms", "p99_ms", "reference_median_ms")),
-                Text(format_error(cell["median_error"]), style=_error_style(cell["median_error"])),
+                Text(format_error(cell["median_error"]), style=_STYLES[grade(cell["median_error"])]),
                 format_speedup(speedup),
             )
         table.add_section()
@@ -82,6 +83,15 @@ def print_tables(console: Console, experiment: Mapping[str, Any]) -> None:
         style="dim",
         highlight=False,
     )
+
+
+def grade(error: float | None) -> str:
+    """Return good, fair or bad for a relative error of a median, nothing for None."""
+    if error is None:
+        return ""
+    if abs(error) <= GOOD_ERROR:
+        return "good"
+    return "fair" if abs(error) <= _FAIR_ERROR else "bad"
 
 
 def _cell(mapping: str, client: str, record: Record) -> dict[str, float | int | None]:
@@ -110,11 +120,3 @@ def _speedups(
         for mapping, clients in mappings.items()
         if software and mapping != "all_software"
     }
-
-
-def _error_style(error: float | None) -> str:
-    if error is None:
-        return ""
-    if abs(error) <= GOOD_ERROR:
-        return "green"
-    return "yellow" if abs(error) <= FAIR_ERROR else "red"

@@ -128,8 +128,10 @@ def spans_figure(spans: Mapping[str, Mapping[str, Mapping[str, float]]]) -> Figu
 def write_grid(path: Path, records: Mapping[str, Mapping[str, Record]]) -> None:
     """Write the grid of `grid_figure` to a `.png` or `.svg` file.
 
-    Raises UsageError for another suffix or if the file cannot be written.
+    Raises UsageError for another suffix, if the file cannot be written, or if there is no record.
     """
+    if not any(records.values()):
+        raise UsageError(f"{path}: there is no record to draw. Run the experiment first.")
     _save(grid_figure(records), path, ("png", "svg"))
 
 
@@ -172,7 +174,7 @@ def inline_svg(figure: Figure) -> str:
         figure.savefig(buffer, format="svg", transparent=True, metadata={"Date": None})
     svg = buffer.getvalue()
     svg = svg[svg.index("<svg") :]
-    svg = re.sub(r"<metadata>.*?</metadata>", "", svg, count=1, flags=re.DOTALL)
+    svg = re.sub(r"<metadata>.*?</metadata>|<!--.*?-->", "", svg, flags=re.DOTALL)
     svg = re.sub(r' xmlns(:xlink)?="[^"]*"', "", svg).replace("xlink:href", "href")
     svg = re.sub(r' width="[^"]*pt" height="[^"]*pt"|height="[^"]*pt" ', "", svg, count=1)
     return svg.replace(INK, "var(--ink)").replace(GREY, "var(--grey)")

@@ -6,7 +6,7 @@ from html import escape
 from typing import TYPE_CHECKING, Any
 
 from reconros_zenoh.errors import UsageError
-from reconros_zenoh.measure.compare import FAIR_ERROR, GOOD_ERROR, MODULO_NOTE
+from reconros_zenoh.measure.compare import MODULO_NOTE, grade
 from reconros_zenoh.measure.findings import findings
 from reconros_zenoh.measure.plots import grid_figure, inline_svg, spans_figure
 from reconros_zenoh.measure.reference.zynq7100 import (
@@ -121,6 +121,8 @@ def _summary(experiment: Mapping[str, Any]) -> str:
 
 def _section(experiment: Mapping[str, Any], records: Mapping[str, Mapping[str, Record]]) -> list[str]:
     parts = [f"<h2>{escape(_name(experiment))}</h2>"]
+    if not any(records.values()):
+        return [*parts, "<p>Nothing was measured.</p>"]
     if clock := _CLOCKS.get(experiment["clock"]):
         parts.append(f"<p>{clock}</p>")
     if experiment["clock"] == "wall" and (overruns := experiment["host"]["overruns"]):
@@ -145,7 +147,8 @@ def _section(experiment: Mapping[str, Any], records: Mapping[str, Mapping[str, R
         "<h3>Speedups</h3>",
         _speedups(experiment),
     ]
-    if spans := experiment.get("spans"):
+    spans = experiment.get("spans") or {}
+    if any(spans.values()):
         parts += [
             "<h3>Where the time goes</h3>",
             _figure(
@@ -172,7 +175,7 @@ def _medians(experiment: Mapping[str, Any]) -> str:
                 (str(cell["lost"]), "bad" if cell["lost"] else ""),
                 (str(cell["wrong"]), "bad" if cell["wrong"] else ""),
                 *(format_ms(cell[key]) for key in ("median_ms", "reference_median_ms")),
-                (format_error(cell["median_error"]), _error_class(cell["median_error"])),
+                (format_error(cell["median_error"]), grade(cell["median_error"])),
                 *(
                     format_ms(cell[key])
                     for key in ("p5_ms", "p25_ms", "p75_ms", "p95_ms", "p99_ms", "max_ms", "mean_ms")
@@ -257,14 +260,6 @@ def _by_client(table: Mapping[str, Mapping[str, Any]]) -> list[tuple[str, str, A
         for mapping, row in table.items()
         if client in row
     ]
-
-
-def _error_class(error: float | None) -> str:
-    if error is None:
-        return ""
-    if abs(error) <= GOOD_ERROR:
-        return "good"
-    return "fair" if abs(error) <= FAIR_ERROR else "bad"
 
 
 def _figure(svg: str, label: str, caption: str) -> str:

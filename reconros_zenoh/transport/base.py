@@ -118,7 +118,10 @@ class Transport(Protocol):
         """The id of the session as it stands in graph tokens: lower case hexadecimal."""
 
     def publish(self, key: str, qos: QosProfile, on_matching: OnMatching | None = None) -> Publisher:
-        """Declare a publisher; with TRANSIENT_LOCAL the last `qos.depth` messages reach late subscribers."""
+        """Declare a publisher on a key without wildcards.
+
+        With TRANSIENT_LOCAL its last `qos.depth` messages reach late subscribers, too.
+        """
 
     def subscribe(self, key: str, sink: Callable[[Sample], None], qos: QosProfile) -> Declaration:
         """Hand every message whose key matches the key expression `key` to `sink`, in order per publisher.
@@ -130,13 +133,16 @@ class Transport(Protocol):
         """Hand every request on `key` to `sink` (a complete queryable)."""
 
     def request(self, key: str, on_matching: OnMatching | None = None) -> Querier:
-        """Declare a querier: target ALL_COMPLETE, no consolidation."""
+        """Declare a querier on a key without wildcards: target ALL_COMPLETE, no consolidation.
+
+        A request before the session has heard of a server (`on_matching`) is over at once.
+        """
 
     def declare_token(self, key: str) -> Declaration:
         """Declare a liveliness token: it is alive until it is closed or the session ends."""
 
     def tokens(self, key: str, timeout_ns: int) -> list[str]:
-        """Return the keys of the live tokens that match `key`; blocks until they are known."""
+        """Return the keys of the live tokens that match `key`; blocks for at most `timeout_ns`."""
 
     def watch_tokens(self, key: str, on_change: Callable[[str, bool], None]) -> Declaration:
         """Report each matching token with True when it comes alive and with False when it goes.

@@ -1,4 +1,4 @@
-"""The key expressions of Zenoh, for a network without Zenoh."""
+"""The key expressions of Zenoh, without Zenoh."""
 
 from __future__ import annotations
 
@@ -24,6 +24,16 @@ def check_key(key: str) -> None:
         )
 
 
+def check_concrete(key: str) -> None:
+    """Raise TransportError unless `key` is well-formed and without wildcards.
+
+    Zenoh takes a pattern for a publisher or a querier, but then some servers answer only within one session.
+    """
+    check_key(key)
+    if "*" in key:
+        raise TransportError(f"{key} has a wildcard: publish and request on one key at a time")
+
+
 def intersects(left: str, right: str) -> bool:
     """Whether a key exists that belongs to both expressions.
 
@@ -33,25 +43,12 @@ def intersects(left: str, right: str) -> bool:
     return left == right or _meet(left.split("/"), right.split("/"), "**", _chunks_meet)
 
 
-def includes(wide: str, narrow: str) -> bool:
-    """Whether every key of `narrow` belongs to `wide`; for a `narrow` without wildcards: whether it does."""
-    return wide == narrow or _cover(wide.split("/"), narrow.split("/"), "**", _chunk_covers)
-
-
 def _chunks_meet(left: str, right: str) -> bool:
     if left == right or _is_any(left, right) or _is_any(right, left):
         return True
     if left.startswith("@") or right.startswith("@"):
         return False
     return _meet(_GLYPH.findall(left), _GLYPH.findall(right), "$*", lambda a, b: a == b or "$*" in {a, b})
-
-
-def _chunk_covers(wide: str, narrow: str) -> bool:
-    if wide == narrow or _is_any(wide, narrow):
-        return True
-    if wide.startswith("@") or narrow.startswith("@") or narrow == "*":
-        return False
-    return _cover(_GLYPH.findall(wide), _GLYPH.findall(narrow), "$*", lambda a, b: a in {b, "$*"})
 
 
 def _is_any(wide: str, narrow: str) -> bool:
@@ -68,16 +65,3 @@ def _meet(left: Sequence[str], right: Sequence[str], many: str, one: Callable[[s
     if right[0] == many:
         return _meet(right, left, many, one)
     return one(left[0], right[0]) and _meet(left[1:], right[1:], many, one)
-
-
-def _cover(wide: Sequence[str], narrow: Sequence[str], many: str, one: Callable[[str, str], bool]) -> bool:
-    """Whether `wide` can stand for whatever `narrow` stands for; `many` as above."""
-    if not wide:
-        return not narrow
-    if wide[0] == many and _cover(wide[1:], narrow, many, one):
-        return True
-    if not narrow or not one(wide[0], narrow[0]):
-        return False
-    if wide[0] == many:
-        return _cover(wide, narrow[1:], many, one)
-    return narrow[0] != many and _cover(wide[1:], narrow[1:], many, one)

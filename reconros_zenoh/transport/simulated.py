@@ -12,7 +12,7 @@ from reconros_zenoh.errors import TransportError
 from reconros_zenoh.ros.qos import Durability
 from reconros_zenoh.transport.base import Reply
 from reconros_zenoh.transport.guard import Closing, GuardedDeclaration
-from reconros_zenoh.transport.key_expressions import check_key, includes, intersects
+from reconros_zenoh.transport.key_expressions import check_concrete, check_key, intersects
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -57,6 +57,7 @@ class SimulatedTransport(Closing):
 
     def publish(self, key: str, qos: QosProfile, on_matching: OnMatching | None = None) -> _Publisher:
         """Declare a publisher, see `Transport.publish`."""
+        check_concrete(key)
         return _Publisher(self._enter(key), key, qos, on_matching)
 
     def subscribe(self, key: str, sink: Callable[[Sample], None], qos: QosProfile) -> _Subscription:
@@ -69,6 +70,7 @@ class SimulatedTransport(Closing):
 
     def request(self, key: str, on_matching: OnMatching | None = None) -> _Querier:
         """Declare a querier, see `Transport.request`."""
+        check_concrete(key)
         return _Querier(self._enter(key), key, on_matching)
 
     def declare_token(self, key: str) -> _Token:
@@ -277,15 +279,14 @@ class _Querier(_Matcher):
 
     def find_route(self) -> None:
         """Know the present servers of this key."""
-        self._route = tuple(s for s in self.network.servers if includes(s.key, self.key))
+        self._route = tuple(s for s in self.network.servers if intersects(s.key, self.key))
         self.tell_matching(bool(self._route))
 
     def get(self, parts: Parts, attachment: bytes | None, on_reply: OnReply, timeout_ns: int) -> None:
         self.check_open()
         exchange = _Exchange(self, on_reply, len(self._route))
         for server in self._route:
-            key = self.key if "*" in server.key else server.key
-            server.post(server.sink, _Request(key, attachment, parts, exchange))
+            server.post(server.sink, _Request(self.key, attachment, parts, exchange))
         # Without a server it is over at once, but never from within this call.
         self.network.environment.call_later(timeout_ns if self._route else 0, exchange.finish)
 
@@ -305,7 +306,7 @@ class _Server(_Declaration):
 
     def _tell_queriers(self) -> None:
         for querier in self.network.queriers:
-            if includes(self.key, querier.key):
+            if intersects(querier.key, self.key):
                 querier.find_route()
 
     def _withdraw(self) -> None:

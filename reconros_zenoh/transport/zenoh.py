@@ -23,6 +23,8 @@ from reconros_zenoh.ros.qos import Durability, History, Reliability
 from reconros_zenoh.transport.base import Reply
 from reconros_zenoh.transport.frames import Frames
 from reconros_zenoh.transport.guard import Closing, GuardedDeclaration
+from reconros_zenoh.transport.key_expressions import check_concrete
+from reconros_zenoh.transport.tokens import TokenChanges, gather
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -46,8 +48,7 @@ class ZenohRouter(Closing):
         Raises TransportError when it cannot listen there, UsageError when `listen` is not an endpoint.
         """
         config = _config("router", {"listen/endpoints": listen})
-        # Nobody is scouted for: without this, opening takes half a second.
-        config.insert_json5("scouting/delay", "0")
+        config.insert_json5("scouting/delay", "0")  # else it scouts half a second for nobody
         try:
             return cls(zenoh.open(config))
         except zenoh.ZError as error:
@@ -82,8 +83,7 @@ class ZenohTransport(Closing):
         config = _config("peer", {"connect/endpoints": router, "listen/endpoints": "tcp/127.0.0.1:0"})
         config.insert_json5("connect/timeout_ms", json.dumps(max(1, round(timeout_s * 1000))))
         config.insert_json5("connect/exit_on_failure", "true")
-        retry = {"period_init_ms": 100, "period_max_ms": 1000, "period_increase_factor": 2}
-        config.insert_json5("connect/retry", json.dumps(retry))
+        config.insert_json5("connect/retry", "{period_init_ms: 100, period_max_ms: 1000}")
         try:
             return cls(zenoh.open(config))
         except zenoh.ZError as error:
@@ -140,19 +140,20 @@ class ZenohTransport(Closing):
         return declaration
 
     def tokens(self, key: str, timeout_ns: int) -> list[str]:
-        """Return the keys of the live tokens that match `key`; waits at most `timeout_ns`."""
-        try:
-            replies = self.session.liveliness().get(key, timeout=timeout_ns / 1e9)
-        except zenoh.ZError as error:
-            raise _failure(f"the tokens {key} cannot be asked for", error) from error
-        return [str(reply.ok.key_expr) for reply in replies if reply.ok is not None]
+        """Return the keys of the live tokens that match `key`: those heard of until none came for 100 ms.
+
+        Deviation: no liveliness get, because right after a session is opened it is answered without most of
+        the tokens, and at any time once in some thousand.
+        """
+        return gather(partial(self.watch_tokens, key), timeout_ns)
 
     def watch_tokens(self, key: str, on_change: Callable[[str, bool], None]) -> _Declaration:
         """Report tokens, see `Transport.watch_tokens`."""
         declaration = _Declaration(self, key)
+        changes = TokenChanges(on_change)
 
         def on_sample(sample: zenoh.Sample) -> None:
-            declaration.call(on_change, str(sample.key_expr), sample.kind == zenoh.SampleKind.PUT)
+            declaration.call(changes.report, str(sample.key_expr), sample.kind == zenoh.SampleKind.PUT)
 
         handler = Callback(on_sample, indirect=False)
         declaration.add(self.session.liveliness().declare_subscriber, key, handler, history=True)
@@ -229,6 +230,7 @@ class _Publisher(_Matcher):
     def __init__(
         self, transport: ZenohTransport, key: str, qos: QosProfile, on_matching: OnMatching | None
     ) -> None:
+        check_concrete(key)
         super().__init__(transport, key, on_matching)
         reliable = qos.reliability is Reliability.RELIABLE
         block = reliable and qos.history is History.KEEP_ALL
@@ -305,8 +307,7 @@ class _Request:
         except zenoh.ZError as error:
             raise _failure(f"the request on {self.key} cannot be answered", error) from error
         finally:
-            # This tells the client that nothing more comes.
-            query.drop()  # type: ignore[no-untyped-call] # so is the stub
+            query.drop()  # type: ignore[no-untyped-call] # tells the client that nothing more comes
 
     def _open(self) -> zenoh.Query:
         if self._query is None:
@@ -318,6 +319,7 @@ class _Querier(_Matcher):
     __slots__ = ("_key_expr",)
 
     def __init__(self, transport: ZenohTransport, key: str, on_matching: OnMatching | None) -> None:
+        check_concrete(key)
         super().__init__(transport, key, on_matching)
         querier = self.add(transport.session.declare_querier, key, target=zenoh.QueryTarget.ALL_COMPLETE)
         self._key_expr = querier.key_expr
@@ -372,9 +374,7 @@ def _config(mode: str, endpoints: dict[str, str]) -> zenoh.Config:
         try:
             config.insert_json5(entry, json.dumps([endpoint]))
         except zenoh.ZError as error:
-            raise UsageError(
-                f"{endpoint!r} is not a Zenoh endpoint: give one such as tcp/127.0.0.1:7447"
-            ) from error
+            raise UsageError(f"{endpoint!r} is not a Zenoh endpoint such as tcp/127.0.0.1:7447") from error
     config.insert_json5("scouting/multicast/enabled", "false")
     config.insert_json5("scouting/gossip/enabled", "true")
     config.insert_json5("timestamping/enabled", "true")  # the caches of transient local publishers need it

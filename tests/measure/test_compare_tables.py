@@ -73,7 +73,7 @@ def test_the_printed_table_fits_80_columns_and_is_plain(board_records):
     assert max(map(len, text.splitlines())) <= 80
     assert "…" not in text
     (row,) = [line.split() for line in text.splitlines() if line.startswith("mixed") and "sort" in line]
-    assert row[:6] == ["mixed", "sort", "200", "0", "0", "2.63"]
+    assert row[:6] == ["mixed", "sort", "201", "0", "0", "2.63"]
     assert row[8:] == ["2.63", "+0.0", "%", "19.65"]
 
 

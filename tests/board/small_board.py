@@ -1,0 +1,170 @@
+"""Boards of which every time is nothing, except what a test names: what is left is what the test is about."""
+
+from __future__ import annotations
+
+from collections import deque
+from functools import cache
+from typing import TYPE_CHECKING, Any
+
+from reconros_zenoh.board.board import Board, SlotPlan
+from reconros_zenoh.board.endpoints import Event
+from reconros_zenoh.board.profile import Profile
+from reconros_zenoh.board.spans import Timeline
+from reconros_zenoh.clock.virtual import VirtualEnvironment
+from reconros_zenoh.rmw.node import Context
+from reconros_zenoh.ros.types import TypeRegistry
+from reconros_zenoh.transport.simulated import SimulatedNetwork
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Generator, Mapping
+
+    import simpy
+
+    from reconros_zenoh.board.callback import HardwareThread, SoftwareContext
+
+BITSTREAM_BYTES = 1000
+"""Of every slot; the ICAP takes one byte per nanosecond."""
+
+types = cache(TypeRegistry)
+
+
+def small_profile(
+    callbacks: Mapping[str, tuple[int, int]] | None = None,
+    *,
+    cores: int = 2,
+    hardware_poll_ns: int = 0,
+    software_poll_ns: int = 0,
+    dispatch_ns: int = 0,
+    dds_message_ns: int = 0,
+    dds_byte_ns: float = 0,
+    dds_byte_large_ns: float = 0,
+    large_from: int = 65536,
+    nack_probability: float = 0,
+    nack_delay_ns: int = 0,
+    stalled: bool = False,
+    link_ns: int = 0,
+    link_byte_ns: float = 0,
+    icap_offset_ns: int = 0,
+    settle_ns: int = 0,
+    osif_ns: int = 0,
+) -> Profile:
+    """`callbacks` gives each name its time in software and what its slot computes; the MEMIF moves 1 B/ns."""
+
+    def of(value: float, unit: str) -> dict[str, object]:
+        return {"value": value, "unit": unit, "basis": "assumed"}
+
+    model = {
+        "cores": {"count": of(cores, "1"), "clock": of(1, "GHz")},
+        "fabric": {"infrastructure_clock": of(1, "GHz"), "thread_clock": of(1, "GHz")},
+        "executor": {
+            "hardware_poll": of(hardware_poll_ns, "ns"),
+            "software_poll": of(software_poll_ns, "ns"),
+            "dispatch": of(dispatch_ns, "ns"),
+        },
+        "dds": {
+            "per_message": of(dds_message_ns, "ns"),
+            "per_byte": of(dds_byte_ns, "ns/B"),
+            "per_byte_large": of(dds_byte_large_ns, "ns/B"),
+            "large_from": of(large_from, "B"),
+            "nack_probability": of(nack_probability, "1"),
+            "nack_delay": of(nack_delay_ns, "ns"),
+            "stalled_by_reconfiguration": stalled,
+        },
+        "link": {"latency": of(link_ns, "ns"), "per_byte": of(link_byte_ns, "ns/B")},
+        "icap": {
+            "bandwidth": of(1, "GB/s"),
+            "offset": of(icap_offset_ns, "ns"),
+            "settle": of(settle_ns, "ns"),
+        },
+        "memif": {"bandwidth": of(1, "GB/s")},
+        "osif": {"call": of(osif_ns, "ns")},
+        "bitstreams": [{"lut": 100, "dsp": 0, "bram36": 0, "size": of(BITSTREAM_BYTES, "B")}],
+        "callbacks": {
+            name: {"software": of(software_ns, "ns"), "compute": of(compute_ns, "ns")}
+            for name, (software_ns, compute_ns) in (callbacks or {}).items()
+        },
+    }
+    return Profile.model_validate({"name": "small", "description": "", "model": model})
+
+
+def small_board(
+    profile: Profile,
+    slots: int = 0,
+    *,
+    environment: VirtualEnvironment | None = None,
+    threads: int | None = None,
+) -> Board:
+    """A board in a network of its own."""
+    environment = environment or VirtualEnvironment()
+    context = Context(SimulatedNetwork(environment).transport("b0"), 0, environment.clock_ns)
+    plans = tuple(SlotPlan(slot, 100, 0, 0) for slot in range(slots))
+    return Board(environment, context, profile, plans, threads=threads)
+
+
+def desktop(board: Board) -> Context:
+    """Another session in the network of the board."""
+    network = board.context.transport._network  # type: ignore[attr-defined] # it is a simulated one
+    return Context(network.transport("c0"), 0, board.environment.clock_ns)
+
+
+class Tickets:
+    """A source that a test fills by hand, without any communication."""
+
+    dropped = 0
+
+    def __init__(self, board: Board) -> None:
+        self._environment = board.environment
+        self._waiting: deque[Event] = deque()
+        self._on_ready: Callable[[], None] = lambda: None
+        self.timelines: list[Timeline] = []
+        self.answers: list[tuple[object, object]] = []
+        self.on_answer: Callable[[], object] = lambda: None
+
+    def open(self, on_ready: Callable[[], None], check: Callable[[Any], None] | None) -> None:
+        self._on_ready = on_ready
+
+    def put(self, message: object) -> None:
+        timeline = Timeline(self._environment, self._environment.now)
+        self.timelines.append(timeline)
+        self._waiting.append(Event(message, timeline))
+        self._on_ready()
+
+    def put_at(self, *times_ns: int) -> None:
+        """Put a ticket at each of these times; the message is the time."""
+        for time_ns in times_ns:
+            self._environment.call_later(time_ns - self._environment.now, self.put, time_ns)
+
+    def is_ready(self) -> bool:
+        return bool(self._waiting)
+
+    def take(self) -> Event:
+        event = self._waiting.popleft()
+        event.timeline.mark("queue")
+        return event
+
+    def answer(self, event: Event, response: object) -> None:
+        self.answers.append((event.message, response))
+        self.on_answer()
+
+
+Log = list[tuple[int, str]]
+
+
+def logging_thread(log: Log, name: str) -> Callable[[HardwareThread], Generator[simpy.Event, object, None]]:
+    """A hardware callback that notes when its slot starts and is done computing."""
+
+    def thread(thread: HardwareThread) -> Generator[simpy.Event, object, None]:
+        log.append((thread._environment.now, f"{name} starts"))
+        yield from thread.compute(int)
+        log.append((thread._environment.now, f"{name} is done"))
+
+    return thread
+
+
+def stages(timeline: Timeline) -> dict[str, int]:
+    """The stages that took any time [ns]."""
+    return {stage: taken_ns for stage, taken_ns in timeline.stages_ns.items() if taken_ns}
+
+
+def ignore(_: Any, __: SoftwareContext) -> None:
+    """A software callback that does nothing."""

@@ -1,0 +1,146 @@
+"""Link and communication stack: what a message costs between the network and the board's queues."""
+
+from __future__ import annotations
+
+import random
+from typing import TYPE_CHECKING
+
+import pytest
+from small_board import small_profile, stages
+
+from reconros_zenoh.board.cpu import Cpu
+from reconros_zenoh.board.dds import DdsStack
+from reconros_zenoh.board.spans import Timeline
+from reconros_zenoh.clock.virtual import VirtualEnvironment
+
+if TYPE_CHECKING:
+    from collections.abc import Generator
+
+    import simpy
+
+    from reconros_zenoh.board.profile import Profile
+
+PROFILE = small_profile(
+    cores=1,
+    link_ns=500,
+    link_byte_ns=2,
+    dds_message_ns=100,
+    dds_byte_ns=3,
+    dds_byte_large_ns=5,
+    large_from=1000,
+    nack_probability=0.1,
+    nack_delay_ns=10_000,
+)
+
+
+class Script(random.Random):
+    """Draws the numbers it is given."""
+
+    def __init__(self, *numbers: float) -> None:
+        super().__init__()
+        self.numbers = list(numbers)
+
+    def random(self) -> float:
+        return self.numbers.pop(0)
+
+
+class Stack:
+    """A stack whose steps are run one at a time."""
+
+    def __init__(self, profile: Profile = PROFILE, *draws: float) -> None:
+        self.environment = VirtualEnvironment()
+        self.cpu = Cpu(self.environment, 1)
+        self.draws = Script(*draws)
+        self._stack = DdsStack(self.environment, self.cpu, profile.model, self.draws)
+
+    def receive(self, size: int, transit_ns: int = 0) -> dict[str, int]:
+        timeline = Timeline(self.environment, self.environment.now - transit_ns)
+        return self._stages(self._stack.receive(size, transit_ns, timeline), timeline)
+
+    def send(self, size: int) -> dict[str, int]:
+        timeline = Timeline(self.environment, self.environment.now)
+        return self._stages(self._stack.send(size, timeline), timeline)
+
+    def _stages(self, step: Generator[simpy.Event, object, None], timeline: Timeline) -> dict[str, int]:
+        self.environment.run(until=self.environment.process(step))
+        assert timeline.total_ns == self.environment.now - timeline.started_ns
+        return stages(timeline)
+
+
+def test_a_message_crosses_the_link_and_then_the_stack() -> None:
+    assert Stack().receive(8) == {"transport": 500 + 8 * 2, "dds": 100 + 8 * 3}
+
+
+def test_a_message_of_the_board_passes_the_stack_and_then_the_link() -> None:
+    stack = Stack()
+    assert stack.send(8) == {"dds": 124, "transport": 516}
+
+
+def test_what_the_message_spent_in_the_real_network_is_not_waited_for_again() -> None:
+    stack = Stack()
+    assert stack.receive(8, transit_ns=300)["transport"] == 516
+    assert stack.environment.now == 216 + 124
+
+
+def test_a_message_that_took_longer_than_the_modelled_link_is_not_delayed() -> None:
+    stack = Stack()
+    assert stack.receive(8, transit_ns=2000)["transport"] == 2000
+    assert stack.environment.now == 124
+
+
+def test_a_sender_whose_clock_is_ahead_does_not_lengthen_the_link() -> None:
+    stack = Stack()
+    stack.environment.run(until=1)
+    timeline = Timeline(stack.environment, 1)
+    stack.environment.run(until=stack.environment.process(stack._stack.receive(8, -400, timeline)))
+    assert stages(timeline) == {"transport": 516, "dds": 124}
+
+
+def test_a_large_message_costs_more_per_byte() -> None:
+    assert Stack(PROFILE, 0.5).receive(1000)["dds"] == 100 + 1000 * 3
+    assert Stack(PROFILE, 0.5).receive(1001)["dds"] == 100 + 1001 * 5
+
+
+def test_a_large_message_that_is_lost_is_sent_again_until_it_is_not() -> None:
+    stack = Stack(PROFILE, 0.09, 0.0, 0.1)
+    once_more = 10_000 + 2000 * 2 + 100 + 2000 * 5
+    assert stack.receive(2000) == {
+        "transport": 500 + 4000,
+        "dds": 100 + 10_000,
+        "retransmission": 2 * once_more,
+    }
+    assert stack.draws.numbers == []
+
+
+def test_what_the_board_sends_can_be_lost_too() -> None:
+    assert Stack(PROFILE, 0.05, 0.9).send(2000) == {
+        "dds": 10_100,
+        "retransmission": 10_000 + 4000 + 10_100,
+        "transport": 4500,
+    }
+
+
+def test_a_small_message_is_never_lost() -> None:
+    stack = Stack(PROFILE, 0.0)
+    assert "retransmission" not in stack.receive(1000)
+    assert stack.draws.numbers == [0.0]
+
+
+def test_the_stack_takes_the_core_from_a_thread() -> None:
+    stack = Stack()
+    thread = stack.environment.process(stack.cpu.run(1000))
+    assert stack.receive(0) == {"transport": 500, "dds": 100}
+    stack.environment.run(until=thread)
+    assert stack.environment.now == 1100
+
+
+@pytest.mark.parametrize("direction", ["receive", "send"])
+def test_without_a_model_a_message_costs_nothing(direction: str) -> None:
+    stack = Stack(small_profile().model_copy(update={"model": None}))
+    assert getattr(stack, direction)(1_000_000) == {}
+    assert stack.environment.now == 0
+
+
+def test_without_a_model_the_time_in_the_real_network_is_accounted_for() -> None:
+    stack = Stack(small_profile().model_copy(update={"model": None}))
+    assert stack.receive(8, transit_ns=700) == {"transport": 700}

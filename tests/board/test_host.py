@@ -1,0 +1,247 @@
+"""Where computations really run: overruns are counted, results are remembered in virtual time only."""
+
+from __future__ import annotations
+
+import threading
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+from small_board import Tickets, small_board, small_profile
+
+from reconros_zenoh.board.executor import Executor
+from reconros_zenoh.board.host import Host, Overruns
+from reconros_zenoh.clock.virtual import VirtualEnvironment
+from reconros_zenoh.clock.wall import WallEnvironment
+from reconros_zenoh.executor.callbacks import CallbackKind
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Generator, Iterator
+    from concurrent.futures import Future
+
+    import simpy
+
+    from reconros_zenoh.board.callback import SoftwareContext
+
+LIMIT_S = 10
+MS = 1_000_000
+
+
+class Counting:
+    """A kernel that counts its calls."""
+
+    def __init__(self, kernel: Callable[..., Any]) -> None:
+        self.calls = 0
+        self._kernel = kernel
+
+    def __call__(self, *arguments: Any) -> Any:
+        self.calls += 1
+        return self._kernel(*arguments)
+
+
+@contextmanager
+def wall_host() -> Iterator[tuple[WallEnvironment, Host]]:
+    environment = WallEnvironment()
+    host = Host(environment, threads=2)
+    yield environment, host
+    host.close()
+
+
+def late_after(
+    environment: VirtualEnvironment, host: Host, modelled_ns: int, future: Future[Any]
+) -> Generator[simpy.Event, object, Any]:
+    yield environment.timeout(modelled_ns)
+    return (yield from host.late_result(future))
+
+
+def run(environment: VirtualEnvironment, process: Generator[simpy.Event, object, Any]) -> Any:
+    return environment.run(until=environment.process(process))
+
+
+def test_in_virtual_time_a_result_is_there_at_once_and_never_late() -> None:
+    environment = VirtualEnvironment()
+    host = Host(environment, threads=None)
+    assert run(environment, host.result(host.start("task", max, 3, 5))) == 5
+    assert run(environment, late_after(environment, host, 100, host.start("task", max, 3, 7))) == 7
+    assert environment.now == 100
+    assert host.overruns == Overruns()
+
+
+def test_in_wall_time_a_result_that_is_there_in_time_is_no_overrun() -> None:
+    with wall_host() as (environment, host):
+        future = host.start("task", max, 3, 5)
+        future.result(LIMIT_S)
+        assert run(environment, late_after(environment, host, 1, future)) == 5
+        assert host.overruns == Overruns()
+
+
+def test_in_wall_time_a_result_later_than_modelled_is_an_overrun_of_the_time_it_was_late() -> None:
+    with wall_host() as (environment, host):
+        may_end = threading.Event()
+        future = host.start("task", may_end.wait, LIMIT_S)
+        began_ns = environment.now
+        # Modelled after 1 ms, there after 3 ms at the earliest.
+        environment.call_later(3 * MS, may_end.set)
+        assert run(environment, late_after(environment, host, 1 * MS, future)) is True
+        assert host.overruns.count == 1
+        assert host.overruns.total_ns == environment.now - began_ns - 1 * MS
+        assert host.overruns.total_ns >= 2 * MS
+
+
+def test_every_overrun_counts() -> None:
+    with wall_host() as (environment, host):
+        for number in (1, 2):
+            may_end = threading.Event()
+            environment.call_later(1 * MS, may_end.set)
+            run(environment, late_after(environment, host, 1, host.start(number, may_end.wait, LIMIT_S)))
+            assert host.overruns.count == number
+
+
+def test_without_a_modelled_time_nothing_is_an_overrun() -> None:
+    with wall_host() as (environment, host):
+        may_end = threading.Event()
+        environment.call_later(1 * MS, may_end.set)
+        assert run(environment, host.result(host.start("task", may_end.wait, LIMIT_S))) is True
+        assert host.overruns == Overruns()
+
+
+@pytest.mark.parametrize("threads", [None, 1], ids=["virtual", "wall"])
+def test_what_a_computation_raises_reaches_who_asks_for_its_result(threads: int | None) -> None:
+    environment = VirtualEnvironment() if threads is None else WallEnvironment()
+    host = Host(environment, threads)
+    with pytest.raises(ZeroDivisionError):
+        run(environment, host.result(host.start("task", divmod, 1, 0)))
+    host.close()
+
+
+def test_a_computation_that_fails_late_is_an_overrun_too() -> None:
+    with wall_host() as (environment, host):
+        may_end = threading.Event()
+
+        def fail() -> None:
+            may_end.wait(LIMIT_S)
+            raise ValueError("late")
+
+        environment.call_later(1 * MS, may_end.set)
+        with pytest.raises(ValueError, match="late"):
+            run(environment, late_after(environment, host, 1, host.start("task", fail)))
+        assert host.overruns.count == 1
+
+
+def test_two_computations_run_at_the_same_time_in_wall_time() -> None:
+    with wall_host() as (environment, host):
+        both = threading.Barrier(2, timeout=LIMIT_S)
+        futures = [host.start(number, both.wait) for number in (1, 2)]
+        assert {run(environment, host.result(future)) for future in futures} == {0, 1}
+
+
+def test_in_wall_time_a_task_that_has_proved_short_runs_in_the_thread_of_the_event_loop() -> None:
+    with wall_host() as (_, host):
+        name = threading.current_thread
+        assert host.start("task", name).result(LIMIT_S) is not threading.current_thread()
+        host._expected_ns["task"] = 1000
+        assert host.start("task", name).result(LIMIT_S) is threading.current_thread()
+        host._expected_ns["task"] = 1_000_000
+        assert host.start("task", name).result(LIMIT_S) is not threading.current_thread()
+
+
+def test_in_virtual_time_equal_inputs_are_computed_once() -> None:
+    host = Host(VirtualEnvironment(), threads=None)
+    kernel = Counting(np.sort)
+    numbers = np.array([3, 1, 2], np.uint32)
+    assert host.compute(kernel, numbers).tolist() == [1, 2, 3]
+    assert host.compute(kernel, numbers.copy()).tolist() == [1, 2, 3]
+    assert kernel.calls == 1
+
+
+def test_in_wall_time_everything_is_computed() -> None:
+    with wall_host() as (_, host):
+        kernel = Counting(np.sort)
+        for _ in range(3):
+            assert host.compute(kernel, np.array([2, 1])).tolist() == [1, 2]
+        assert kernel.calls == 3
+
+
+GRID = np.arange(6, dtype=np.uint32).reshape(2, 3)
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        pytest.param(GRID + 1, id="content"),
+        pytest.param(GRID.reshape(3, 2), id="shape"),
+        pytest.param(GRID.view(np.int32), id="type"),
+        pytest.param(GRID.T, id="order"),
+        pytest.param(np.empty((0, 3), np.uint32), id="empty"),
+        pytest.param(7, id="number"),
+    ],
+)
+def test_an_array_that_differs_is_computed_anew(other: Any) -> None:
+    host = Host(VirtualEnvironment(), threads=None)
+    kernel = Counting(lambda array: np.shape(array))
+    assert host.compute(kernel, GRID) == (2, 3)
+    assert host.compute(kernel, other) == np.shape(other)
+    assert kernel.calls == 2
+
+
+def test_equal_arrays_are_equal_however_they_lie_in_memory() -> None:
+    host = Host(VirtualEnvironment(), threads=None)
+    kernel = Counting(np.sum)
+    host.compute(kernel, GRID)
+    host.compute(kernel, np.asfortranarray(GRID))
+    host.compute(kernel, np.repeat(GRID, 2, axis=1)[:, ::2])
+    assert kernel.calls == 1
+
+
+def test_two_kernels_do_not_share_results() -> None:
+    host = Host(VirtualEnvironment(), threads=None)
+    assert host.compute(np.max, GRID) == 5
+    assert host.compute(np.min, GRID) == 0
+
+
+def test_only_the_results_used_last_are_kept() -> None:
+    host = Host(VirtualEnvironment(), threads=None)
+    kernel = Counting(abs)
+    for number in range(512):
+        host.compute(kernel, number)
+    host.compute(kernel, 0)  # used again: now 1 is the oldest
+    host.compute(kernel, 512)
+    assert kernel.calls == 513
+    host.compute(kernel, 0)
+    assert kernel.calls == 513
+    host.compute(kernel, 1)
+    assert kernel.calls == 514
+
+
+def test_a_kernel_that_raises_is_tried_again() -> None:
+    host = Host(VirtualEnvironment(), threads=None)
+    kernel = Counting(lambda number: 1 / number)
+    for _ in range(2):
+        with pytest.raises(ZeroDivisionError):
+            host.compute(kernel, 0)
+    assert kernel.calls == 2
+
+
+def test_a_slow_host_shows_in_the_spans_of_the_callback_and_of_nobody_else() -> None:
+    environment = WallEnvironment()
+    board = small_board(small_profile({"slow": (1 * MS, 0)}), environment=environment, threads=1)
+    executor = Executor(board, software_workers=1, hardware_workers=0)
+    source = Tickets(board)
+    may_end = threading.Event()
+
+    def callback(_: object, __: SoftwareContext) -> bool:
+        return may_end.wait(LIMIT_S)
+
+    executor.add_sw_callback("slow", CallbackKind.SUB, source, callback)
+    executor.spin()
+    environment.call_later(0, source.put, "ticket")
+    environment.call_later(3 * MS, may_end.set)
+    done = environment.event()
+    source.on_answer = done.succeed
+    environment.run(until=done)
+    board.close()
+    (timeline,) = source.timelines
+    assert timeline.stages_ns["execution"] == 1 * MS
+    assert timeline.stages_ns["overrun"] == board.host.overruns.total_ns >= 2 * MS
+    assert board.host.overruns.count == 1

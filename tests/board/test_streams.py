@@ -1,0 +1,71 @@
+"""Streams: in order, one at a time, and what happens when too many wait."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from reconros_zenoh.board.stream import Stream
+from reconros_zenoh.clock.virtual import VirtualEnvironment
+
+if TYPE_CHECKING:
+    from collections.abc import Generator
+
+    import simpy
+
+
+class SlowStream:
+    """A stream that takes 100 ns for each item."""
+
+    def __init__(self, depth: int) -> None:
+        self.environment = VirtualEnvironment()
+        self.log: list[tuple[int, str]] = []
+        self.stream = Stream(self._process, depth)
+
+    def _process(self, item: str) -> Generator[simpy.Event, object, None]:
+        self.log.append((self.environment.now, f"{item} begins"))
+        yield self.environment.timeout(100)
+        self.log.append((self.environment.now, f"{item} ends"))
+
+    def put_at(self, time_ns: int, *items: str) -> None:
+        for item in items:
+            self.environment.call_later(time_ns, self.stream.put, item)
+
+
+def test_one_after_the_other_in_order() -> None:
+    slow = SlowStream(depth=10)
+    slow.put_at(30, "a")
+    slow.put_at(50, "b", "c")
+    slow.environment.run()
+    assert slow.log == [
+        (30, "a begins"),
+        (130, "a ends"),
+        (130, "b begins"),
+        (230, "b ends"),
+        (230, "c begins"),
+        (330, "c ends"),
+    ]
+
+
+def test_after_a_pause_the_next_begins_at_once() -> None:
+    slow = SlowStream(depth=1)
+    slow.put_at(0, "a")
+    slow.put_at(1000, "b")
+    slow.environment.run()
+    assert slow.log[2:] == [(1000, "b begins"), (1100, "b ends")]
+
+
+def test_when_too_many_wait_the_oldest_are_pushed_out_and_counted() -> None:
+    slow = SlowStream(depth=2)
+    slow.put_at(0, "a")
+    slow.put_at(10, "b", "c", "d", "e")  # a is in work, two may wait
+    slow.environment.run()
+    assert [text for _, text in slow.log if "begins" in text] == ["a begins", "d begins", "e begins"]
+    assert slow.stream.dropped == 2
+
+
+def test_several_put_at_once_before_it_begins() -> None:
+    slow = SlowStream(depth=3)
+    slow.put_at(5, "a", "b", "c")
+    slow.environment.run()
+    assert len(slow.log) == 6
+    assert slow.stream.dropped == 0

@@ -1,0 +1,294 @@
+"""`reconros up` and `reconros down` as processes, with their state in a temporary folder."""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import signal
+import subprocess
+import sys
+from typing import TYPE_CHECKING
+
+import psutil
+import pytest
+from rich.console import Console
+
+from deploy.compose import Healthcheck
+from deploy.logs import LogReader, last_lines
+from deploy.service_run import ServiceState
+from deploy.state import StateFolder
+from reconros_zenoh.cli.service_screen import ServiceScreen
+from reconros_zenoh.errors import FileError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from pathlib import Path
+
+    from conftest import Services
+
+    Start = Callable[..., subprocess.Popen[str]]
+    Run = Callable[..., subprocess.CompletedProcess[str]]
+
+PROGRAM = """
+import sys, typer
+from reconros_zenoh.cli.up import down, up
+from reconros_zenoh.errors import ReconrosError, UsageError
+app = typer.Typer()
+app.command()(up)
+app.command()(down)
+try:
+    app()
+except ReconrosError as error:
+    print(error, file=sys.stderr)
+    sys.exit(2 if isinstance(error, UsageError) else 1)
+"""
+
+
+@pytest.fixture
+def start(tmp_path: Path) -> Start:
+    """Return a function that starts `up` or `down` for the Compose file of the test."""
+
+    def start_command(verb: str, *options: str) -> subprocess.Popen[str]:
+        return subprocess.Popen(
+            [sys.executable, "-c", PROGRAM, verb, "-f", str(tmp_path / "compose.yaml"), *options],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            env={
+                **os.environ,
+                "PYTHONPATH": os.pathsep.join(sys.path),
+                "XDG_STATE_HOME": str(tmp_path / "state"),
+                "COLUMNS": "80",
+            },
+        )
+
+    return start_command
+
+
+@pytest.fixture
+def run(start: Start) -> Iterator[Run]:
+    """Return a function that runs `up` or `down` to its end; after the test it is stopped."""
+
+    def run_command(verb: str, *options: str) -> subprocess.CompletedProcess[str]:
+        with start(verb, *options) as process:
+            output, errors = process.communicate()
+            return subprocess.CompletedProcess(process.args, process.returncode, output, errors)
+
+    yield run_command
+    run_command("down")
+
+
+def _server_and(services: Services, client: str) -> None:
+    services.compose_file(
+        services.service("server", "print('open'); write('r'); block()", services.when_written("r")),
+        services.service("client", client, server="healthy"),
+    )
+
+
+def _supervisor(services: Services) -> psutil.Process:
+    return psutil.Process(int((services.folder / "server.pid").read_text())).parent()
+
+
+def test_up_ends_with_0_when_all_services_do(services: Services, run: Run) -> None:
+    services.compose_file(
+        services.service("one", "print('first'); sys.stdout.write('no end of line')"),
+        services.service("three", "print('[bold]not markup', ' ' * 100, '|')", one="completed_successfully"),
+    )
+    done = run("up")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.splitlines() == [
+        "one: started",
+        "one   | first",
+        "one   | no end of line",
+        "one: ended",
+        "three: started",
+        f"three | [bold]not markup {' ' * 100} |",
+        "three: ended",
+    ]
+    assert "Nothing" not in run("down").stdout
+
+
+def test_up_names_the_service_that_failed(services: Services, run: Run) -> None:
+    _server_and(services, "print('oh no'); sys.exit(7)")
+    done = run("up")
+    assert done.returncode == 1
+    assert done.stderr.startswith("Service client ended with status 7.\n")
+    assert done.stderr.endswith("    oh no\n")
+    assert "server: stopped\n" in done.stdout
+    services.assert_gone()
+
+
+def test_up_prints_only_json_when_told_to(services: Services, run: Run) -> None:
+    _server_and(services, "sys.exit(7)")
+    done = run("up", "--json")
+    result = json.loads(done.stdout)
+    assert done.returncode == 1
+    assert result["services"] == {"server": "stopped", "client": "failed"}
+    assert result["error"].startswith("Service client ended with status 7.")
+    assert (services.folder / result["logs"] / "server.log").read_text() == "open\n"
+
+
+def test_ctrl_c_stops_all(services: Services, start: Start) -> None:
+    _server_and(services, "block()")
+    with start("up") as process:
+        assert process.stdout is not None
+        assert any(line == "client: started\n" for line in process.stdout)
+        process.send_signal(signal.SIGINT)
+        output, errors = process.communicate()
+        assert (process.returncode, errors) == (130, "")
+    states = [line for line in output.splitlines() if line.endswith(": stopped")]
+    assert states == ["client: stopped", "server: stopped"]
+    services.assert_gone()
+
+
+def test_down_stops_what_up_has_left_running(services: Services, run: Run) -> None:
+    _server_and(services, "block()")
+    up = run("up", "-d")
+    assert (up.returncode, up.stderr) == (0, "")
+    assert up.stdout.splitlines()[:3] == ["server: started", "server: healthy", "client: started"]
+    assert _supervisor(services).is_running()
+
+    for options in ([], ["-d"]):
+        again = run("up", *options)
+        assert again.returncode == 2
+        assert "is up already" in again.stderr
+        assert f"reconros down -f {services.folder / 'compose.yaml'}" in again.stderr
+
+    down = run("down", "--json")
+    assert down.returncode == 0
+    assert json.loads(down.stdout)["services"] == {"server": "stopped", "client": "stopped"}
+    services.assert_gone()
+    nothing = run("down")
+    assert (nothing.returncode, nothing.stdout) == (
+        0,
+        f"Nothing of {services.folder / 'compose.yaml'} is running.\n",
+    )
+
+
+def test_down_stops_a_foreground_up_too(services: Services, start: Start, run: Run) -> None:
+    _server_and(services, "block()")
+    with start("up") as process:
+        assert process.stdout is not None
+        assert any(line == "client: started\n" for line in process.stdout)
+        assert run("down").stdout.splitlines() == ["server: stopped", "client: stopped"]
+        process.communicate()
+        assert process.returncode == 128 + signal.SIGTERM
+    services.assert_gone()
+
+
+def test_up_detached_that_fails_leaves_nothing(services: Services, run: Run) -> None:
+    never = Healthcheck(("false",), 10**6, retries=1)
+    services.compose_file(
+        services.service("server", "block()", never), services.service("client", "", server="started")
+    )
+    done = run("up", "-d", "--json")
+    assert done.returncode == 1
+    assert json.loads(done.stdout)["services"]["server"] == "stopped"
+    assert done.stderr.startswith("Service server does not get healthy")
+    services.assert_gone()
+
+
+def test_down_tells_why_it_had_ended_before(services: Services, run: Run) -> None:
+    os.mkfifo(services.folder / "pipe")
+    _server_and(services, "(folder / 'pipe').open('rb').read(); sys.exit(9)")
+    assert run("up", "-d").returncode == 0
+    supervisor = _supervisor(services)
+    (services.folder / "pipe").write_bytes(b"go on")
+    supervisor.wait(timeout=10)
+    down = run("down")
+    assert down.stdout.startswith(
+        "server: stopped\nclient: failed\nIt had failed before: Service client ended with"
+    )
+    services.assert_gone()
+
+
+def test_a_killed_supervisor_is_no_obstacle(services: Services, run: Run) -> None:
+    _server_and(services, "block()")
+    for verb in ("down", "up"):
+        (services.folder / "r").unlink(missing_ok=True)
+        assert run("up", "-d").returncode == 0
+        _supervisor(services).kill()
+        services.assert_gone()
+        if verb == "down":
+            assert "was killed" in run("down").stdout
+    assert run("up", "-d").returncode == 0
+    assert run("down").stdout.startswith("server: stopped")
+
+
+def test_ctrl_c_while_waiting_for_health_stops_all(services: Services, start: Start) -> None:
+    os.mkfifo(services.folder / "pipe")
+    services.compose_file(
+        services.service(
+            "server", "(folder / 'pipe').write_text('x'); block()", services.when_written("never")
+        )
+    )
+    with start("up", "-d", "--json") as process:
+        assert (services.folder / "pipe").read_text() == "x"
+        process.send_signal(signal.SIGINT)
+        output, errors = process.communicate()
+        assert (process.returncode, errors) == (130, "")
+    assert json.loads(output)["services"] == {"server": "stopped"}
+    services.assert_gone()
+
+
+def test_the_supervisor_does_not_outlive_who_waits_for_it(services: Services, start: Start) -> None:
+    os.mkfifo(services.folder / "pipe")
+    services.compose_file(
+        services.service(
+            "server", "(folder / 'pipe').open('rb').read(); write('r'); block()", services.when_written("r")
+        )
+    )
+    with start("up", "-d") as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "server: started\n"
+        process.kill()
+    (services.folder / "pipe").write_bytes(b"go on")  # the next change of state finds nobody to tell
+    services.assert_gone()
+
+
+def test_a_state_folder_that_cannot_be_made_is_told(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    folder = StateFolder(tmp_path / "compose.yaml", {"XDG_STATE_HOME": str(tmp_path / "file")})
+    with pytest.raises(FileError, match="Set XDG_STATE_HOME"):
+        folder.make()
+
+
+def test_files_of_one_name_have_states_of_their_own(tmp_path: Path) -> None:
+    paths = {StateFolder(tmp_path / name / "compose.yaml", {}).path for name in ("a", "b", "a/../a")}
+    assert len(paths) == 2
+
+
+def test_the_terminal_shows_states_below_the_lines(tmp_path: Path) -> None:
+    text = io.StringIO()
+    console = Console(file=text, force_terminal=True, width=60, soft_wrap=True, color_system=None)
+    (tmp_path / "board.log").write_text("\x1b[1mready\x1b[0m\nto serve")
+    with ServiceScreen(console, ["router", "board"], tmp_path) as screen:
+        screen.show("board", ServiceState.STARTED)
+        screen.show("board", ServiceState.FAILED)
+    assert screen.states == {"router": ServiceState.WAITING, "board": ServiceState.FAILED}
+    shown = text.getvalue()
+    assert "board  | ready" in shown
+    assert "board  | to serve" in shown
+    assert shown.index("to serve") < shown.rindex("router  waiting") < shown.rindex("board   failed")
+
+
+def test_a_log_is_read_line_by_line(tmp_path: Path) -> None:
+    path = tmp_path / "log"
+    reader = LogReader(path)
+    with path.open("ab", buffering=0) as log:
+        assert list(reader.new_lines()) == []
+        log.write(b"one\r\ntw")
+        assert list(reader.new_lines()) == ["one"]
+        log.write(b"o\n\xff\n\nend")
+        assert list(reader.new_lines()) == ["two", "\N{REPLACEMENT CHARACTER}", ""]
+        assert list(reader.new_lines(all_of_it=True)) == ["end"]
+        assert list(reader.new_lines(all_of_it=True)) == []
+
+
+def test_the_last_lines_of_a_log() -> None:
+    many = b"".join(b"%06d\n" % i for i in range(100_000))
+    assert last_lines(io.BytesIO(many), 2) == ["099998", "099999"]
+    assert last_lines(io.BytesIO(b"a\nb"), 20) == ["a", "b"]
+    assert last_lines(io.BytesIO(b""), 20) == []
