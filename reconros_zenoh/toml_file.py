@@ -58,12 +58,25 @@ class TomlFile:
 
 
 def _find_header(lines: Sequence[str], tables: Sequence[str]) -> int | None:
-    """Return the index of the first line below the header `[a.b]`, 0 for the top table, None when absent."""
+    """Return the index of the first line below the header `[a.b]`, 0 for the top table, None when absent.
+
+    A number at the end picks among the headers `[[a.b]]` of an array of tables.
+    """
     if not tables:
         return 0
-    for index, line in enumerate(lines):
-        if line.strip().startswith("[") and line.split("#", 1)[0].strip().strip("[] ").replace(
-            '"', ""
-        ) == ".".join(tables):
-            return index + 1
-    return None
+    *array, last = tables
+    found = _headers(lines, tables)[:1] or (
+        _headers(lines, array)[int(last) :][:1] if last.isdecimal() else []
+    )
+    return found[0] if found else None
+
+
+def _headers(lines: Sequence[str], tables: Sequence[str]) -> list[int]:
+    """Return the indices of the lines below each header of that name."""
+    name = ".".join(tables)
+    return [
+        index + 1
+        for index, line in enumerate(lines)
+        if line.strip().startswith("[")
+        and line.split("#", 1)[0].strip().strip("[] ").replace('"', "") == name
+    ]

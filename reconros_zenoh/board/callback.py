@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator
-    from concurrent.futures import Future
 
     import numpy as np
-    import simpy
 
     from reconros_zenoh.board.bitstream import Bitstream
     from reconros_zenoh.board.endpoints import TopicWriter
@@ -18,6 +17,7 @@ if TYPE_CHECKING:
     from reconros_zenoh.board.memif import Memif
     from reconros_zenoh.board.osif import Osif
     from reconros_zenoh.board.spans import Timeline
+    from reconros_zenoh.clock.activity import Awaitable
     from reconros_zenoh.clock.virtual import VirtualEnvironment
     from reconros_zenoh.transport.base import Parts
 
@@ -26,7 +26,7 @@ R = TypeVar("R")
 SoftwareCallback: TypeAlias = "Callable[[Any, SoftwareContext], object]"
 """Called with the message (None for a timer); a service server's callback returns the response."""
 
-HardwareCallback: TypeAlias = "Callable[[HardwareThread], Generator[simpy.Event, object, object]]"
+HardwareCallback: TypeAlias = "Callable[[HardwareThread], Generator[Awaitable, object, object]]"
 """A generator; a service server's callback returns the response."""
 
 
@@ -89,28 +89,28 @@ class HardwareThread:
         self._compute_ns = compute_ns
         self._timeline = timeline
 
-    def get_init_data(self) -> Generator[simpy.Event, object, Any]:
+    def get_init_data(self) -> Generator[Awaitable, object, Any]:
         """Return the message that the callback was started with: THREAD_GETINITDATA."""
         yield from self._osif.call()
         self._timeline.mark("osif")
         return self._message
 
-    def mem_read(self, data: np.ndarray[Any, Any]) -> Generator[simpy.Event, object, np.ndarray[Any, Any]]:
+    def mem_read(self, data: np.ndarray[Any, Any]) -> Generator[Awaitable, object, np.ndarray[Any, Any]]:
         """Return the array once it has come from main memory into the slot: MEM_READ."""
         yield from self._memif.transfer(data.nbytes)
         self._timeline.mark("memif")
         return data
 
-    def mem_write(self, data: np.ndarray[Any, Any]) -> Generator[simpy.Event, object, None]:
+    def mem_write(self, data: np.ndarray[Any, Any]) -> Generator[Awaitable, object, None]:
         """Return when the array has gone from the slot to main memory: MEM_WRITE."""
         yield from self._memif.transfer(data.nbytes)
         self._timeline.mark("memif")
 
-    def compute(self, kernel: Callable[..., R], *arguments: object) -> Generator[simpy.Event, object, R]:
+    def compute(self, kernel: Callable[..., R], *arguments: object) -> Generator[Awaitable, object, R]:
         """Return `kernel(*arguments)` of a pure kernel when the slot has computed it."""
-        future: Future[R] = self._host.start(kernel, self._host.compute, kernel, *arguments)
+        future = self._host.start(kernel, partial(self._host.compute, kernel, *arguments))
         if self._compute_ns is None:
-            result = yield from self._host.result(future)
+            result: R = yield from self._host.result(future)
             self._timeline.mark("execution")
             return result
         yield self._environment.timeout(self._compute_ns)
@@ -119,7 +119,7 @@ class HardwareThread:
         self._timeline.mark("overrun")
         return result
 
-    def publish(self, writer: TopicWriter, message: object) -> Generator[simpy.Event, object, None]:
+    def publish(self, writer: TopicWriter, message: object) -> Generator[Awaitable, object, None]:
         """Publish the message through the delegate: ROS_PUBLISHER_PUBLISH."""
         yield from self._osif.call()
         self._timeline.mark("osif")

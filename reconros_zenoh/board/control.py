@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from contextlib import closing
 from queue import SimpleQueue
+from threading import Event
 from typing import TYPE_CHECKING, Any
 
 import msgpack
@@ -95,11 +97,18 @@ def status(board: Board, executor: Executor) -> dict[str, Any]:
 
 def ask_status(transport: Transport, board: str) -> dict[str, Any]:
     """Return the status of the board of that name; raise TransportError when it does not answer."""
+    found = Event()
     replies: SimpleQueue[Reply | None] = SimpleQueue()
-    querier = transport.request(f"reconros/{board}/status")
-    querier.get((b"",), None, replies.put, _ANSWER_NS)
-    reply = replies.get()
-    querier.close()
+
+    def on_matching(matching: bool) -> None:
+        if matching:
+            found.set()
+
+    with closing(transport.request(f"reconros/{board}/status", on_matching)) as querier:
+        # A session that is just open has not heard of the board yet.
+        found.wait(_ANSWER_NS / 1e9)
+        querier.get((b"",), None, replies.put, _ANSWER_NS)
+        reply = replies.get()
     if reply is None or reply.payload is None:
         raise TransportError(
             f"no board named {board!r} answers. Start it with `reconros board --name {board}`."

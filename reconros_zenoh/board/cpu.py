@@ -9,8 +9,7 @@ from reconros_zenoh.board.sharing import SharedResource
 if TYPE_CHECKING:
     from collections.abc import Generator
 
-    import simpy
-
+    from reconros_zenoh.clock.activity import Awaitable
     from reconros_zenoh.clock.virtual import VirtualEnvironment
 
 
@@ -24,11 +23,11 @@ class Cpu:
     def __init__(self, environment: VirtualEnvironment, cores: int) -> None:
         self._cores = SharedResource(environment, capacity=cores, per_job=1)
 
-    def run(self, core_time_ns: float) -> Generator[simpy.Event, object, None]:
+    def run(self, core_time_ns: float) -> Generator[Awaitable, object, None]:
         """Return when a thread has had `core_time_ns` on the cores."""
         return self._cores.serve(core_time_ns)
 
-    def run_stack(self, core_time_ns: float) -> Generator[simpy.Event, object, None]:
+    def run_stack(self, core_time_ns: float) -> Generator[Awaitable, object, None]:
         """Return when the communication stack has had `core_time_ns` on the cores."""
         return self._cores.serve(core_time_ns, first=True)
 

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     import simpy
 
     from reconros_zenoh.board.board import Board
+    from reconros_zenoh.clock.activity import Awaitable
     from reconros_zenoh.rmw.node import Node
     from reconros_zenoh.rmw.received import Received, Responder
     from reconros_zenoh.ros.types import MessageType, ServiceType
@@ -94,7 +95,7 @@ class Reader:
         environment = self._board.environment
         self._stream.put((received, Timeline(environment, environment.now - received.transit_ns)))
 
-    def _receive(self, item: tuple[Received, Timeline]) -> Generator[simpy.Event, object, None]:
+    def _receive(self, item: tuple[Received, Timeline]) -> Generator[Awaitable, object, None]:
         received, timeline = item
         # What it waited behind its predecessor counts as time on the way.
         transit_ns = self._board.environment.now - timeline.started_ns
@@ -213,7 +214,7 @@ class Writer:
         """Have `send` called when a message of these parts has gone through the stack and over the link."""
         self._stream.put(_Outgoing(send, sum(len(part) for part in parts), timeline))
 
-    def _send(self, outgoing: _Outgoing) -> Generator[simpy.Event, object, None]:
+    def _send(self, outgoing: _Outgoing) -> Generator[Awaitable, object, None]:
         yield from self._board.dds.send(outgoing.size, outgoing.timeline)
         # A large message is copied into the transport: not by the thread that keeps the clock.
         yield from self._board.host.result(self._board.host.start(self, outgoing.send))

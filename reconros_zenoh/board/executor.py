@@ -71,7 +71,7 @@ class Executor:
         self._bitstreams = bitstreams
         self._policy = StandardExecutor() if kind == "standard" else ReconrosExecutor()
         self._registrations: dict[str, _Registration] = {}
-        self._workers: list[Worker] = []
+        self._workers_of: dict[str, list[Worker]] = {}
         self.calls: Counter[str] = Counter()
         self.failures: Counter[str] = Counter()
 
@@ -131,9 +131,12 @@ class Executor:
         model = board.profile.model
         software_poll_ns = model.executor.software_poll.ns if model and self.kind == "reconros" else 0
         hardware_poll_ns = model.executor.hardware_poll.ns if model else 0
-        self._workers = [SoftwareWorker(self, software_poll_ns) for _ in range(self._software_workers)]
-        self._workers += [HardwareWorker(self, slot, hardware_poll_ns) for slot in self._slots]
+        workers: list[Worker] = [
+            SoftwareWorker(self, software_poll_ns) for _ in range(self._software_workers)
+        ]
+        workers += [HardwareWorker(self, slot, hardware_poll_ns) for slot in self._slots]
         for entry in self._policy.callbacks:
+            self._workers_of[entry.name] = [worker for worker in workers if worker.resource in entry.mask]
             registration = self._registrations[entry.name]
             registration.source.open(partial(self._became_ready, entry), registration.check)
 
@@ -211,5 +214,5 @@ class Executor:
         self._wake(dispatch.entry)
 
     def _wake(self, entry: CallbackEntry) -> None:
-        for worker in self._workers:
-            worker.wake(entry)
+        for worker in self._workers_of[entry.name]:
+            worker.wake()

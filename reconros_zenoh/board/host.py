@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import os
+import sys
+import threading
 import time
 from collections import OrderedDict
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, TypeVar, cast
 
 import numpy as np
 import xxhash
@@ -14,11 +17,11 @@ import xxhash
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator
 
-    import simpy
-
+    from reconros_zenoh.clock.activity import Awaitable
     from reconros_zenoh.clock.virtual import VirtualEnvironment
 
 R = TypeVar("R")
+R_co = TypeVar("R_co", covariant=True)
 _RESULTS_KEPT = 512
 _IN_LINE_NS = 100_000
 """About what it costs to hand a computation to another thread and its result back."""
@@ -32,43 +35,64 @@ class Overruns:
     total_ns: int = 0
 
 
+class _Done(Generic[R_co]):
+    """A computation that ran in line; a Future would cost more than most of those."""
+
+    __slots__ = ("_error", "_result")
+
+    def __init__(self, result: R_co | None, error: BaseException | None) -> None:
+        self._result = result
+        self._error = error
+
+    def done(self) -> bool:
+        return True
+
+    def result(self) -> R_co:
+        if self._error is not None:
+            raise self._error
+        return cast("R_co", self._result)
+
+
 class Host:
     """Runs the real computation while the model decides when its result is ready.
 
-    In wall time what takes long runs in a pool of threads, and what is known to be over sooner than a thread could
-    be woken runs in line. In virtual time everything runs in line, and a pure kernel computes equal inputs once.
+    In wall time what takes long runs in a pool of threads, and what is known to be over sooner than a thread
+    could be woken runs in line. In virtual time everything runs in line, and a pure kernel computes equal
+    inputs once.
     """
 
     def __init__(self, environment: VirtualEnvironment, threads: int | None) -> None:
         """`threads` is the size of the pool, None in virtual time."""
         self._environment = environment
         self._pool = (
-            None if threads is None else ThreadPoolExecutor(threads, thread_name_prefix="computation")
+            None
+            if threads is None
+            else ThreadPoolExecutor(
+                threads, thread_name_prefix="computation", initializer=_yield_to_the_clock
+            )
         )
         self._expected_ns: dict[object, float] = {}
         self._results: OrderedDict[object, object] = OrderedDict()
         self.overruns = Overruns()
 
-    def start(self, task: object, function: Callable[..., R], *arguments: object) -> Future[R]:
+    def start(self, task: object, function: Callable[..., R], *arguments: object) -> Future[R] | _Done[R]:
         """Start a computation and return its future; `task` names what tends to take equally long."""
         if self._pool is not None and self._expected_ns.get(task, _IN_LINE_NS) >= _IN_LINE_NS:
             return self._pool.submit(self._timed, task, function, *arguments)
-        future: Future[R] = Future()
         try:
-            future.set_result(self._timed(task, function, *arguments))
+            return _Done(self._timed(task, function, *arguments), None)
         except Exception as error:  # noqa: BLE001 - handed to whoever asks for the result
-            future.set_exception(error)
-        return future
+            return _Done(None, error)
 
-    def result(self, future: Future[R]) -> Generator[simpy.Event, object, R]:
+    def result(self, future: Future[R] | _Done[R]) -> Generator[Awaitable, object, R]:
         """Return the result of a started computation once it is there; raises what it raised."""
-        if not future.done():
+        if isinstance(future, Future) and not future.done():
             ready = self._environment.event()
             future.add_done_callback(lambda _: self._environment.post(ready.succeed))
             yield ready
         return future.result()
 
-    def late_result(self, future: Future[R]) -> Generator[simpy.Event, object, R]:
+    def late_result(self, future: Future[R] | _Done[R]) -> Generator[Awaitable, object, R]:
         """Return the result like `result`, whose time has come in the model: any wait is an overrun."""
         due_ns = self._environment.now
         on_time = future.done()
@@ -108,9 +132,32 @@ class Host:
             self._expected_ns[task] = expected_ns + (took_ns - expected_ns) / 8
 
 
+def _yield_to_the_clock() -> None:
+    """Let the thread that keeps the clock go first where cores are short; Linux has priorities per thread."""
+    if sys.platform == "linux":
+        os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), 10)
+
+
+class _Unchanging:
+    """An array that owns its content and cannot be written: it is equal to itself, whatever it holds."""
+
+    __slots__ = ("_array",)
+
+    def __init__(self, array: np.ndarray[Any, Any]) -> None:
+        self._array = array
+
+    def __hash__(self) -> int:
+        return id(self._array)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Unchanging) and other._array is self._array
+
+
 def _identity(argument: object) -> object:
     """Return something equal for equal arguments: arrays by shape, type and a hash of their content."""
     if isinstance(argument, np.ndarray):
+        if argument.base is None and not argument.flags.writeable:
+            return _Unchanging(argument)
         content = np.ascontiguousarray(argument)
         return argument.shape, argument.dtype.str, xxhash.xxh3_128_digest(content.data)
     return argument

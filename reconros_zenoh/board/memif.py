@@ -9,8 +9,7 @@ from reconros_zenoh.board.sharing import SharedResource
 if TYPE_CHECKING:
     from collections.abc import Generator
 
-    import simpy
-
+    from reconros_zenoh.clock.activity import Awaitable
     from reconros_zenoh.clock.virtual import VirtualEnvironment
 
 
@@ -26,7 +25,7 @@ class Memif:
         self._bus = SharedResource(environment, capacity=bytes_per_ns or 1, per_job=bytes_per_ns or 1)
         self.transferred_bytes = 0
 
-    def transfer(self, size: int) -> Generator[simpy.Event, object, None]:
+    def transfer(self, size: int) -> Generator[Awaitable, object, None]:
         """Return when `size` bytes have gone from or to the main memory."""
         self.transferred_bytes += size
         return self._bus.serve(size if self._modelled else 0)

@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Generator
 
-    import simpy
-
     from reconros_zenoh.board.cpu import Cpu
+    from reconros_zenoh.clock.activity import Awaitable
 
 
 class Osif:
@@ -23,7 +22,7 @@ class Osif:
         self._call_ns = call_ns
         self.calls = 0
 
-    def call(self) -> Generator[simpy.Event, object, None]:
+    def call(self) -> Generator[Awaitable, object, None]:
         """Return when the delegate has carried out one call."""
         self.calls += 1
         return self._cpu.run(self._call_ns)

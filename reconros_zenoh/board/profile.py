@@ -96,7 +96,7 @@ class OsifSection(_Section):
 class BitstreamSection(_Section):
     """The size of a partial bitstream of a slot with these resources."""
 
-    lut: Annotated[int, Field(ge=0)]
+    lut: Annotated[int, Field(gt=0)]
     dsp: Annotated[int, Field(ge=0)]
     bram36: Annotated[int, Field(ge=0)]
     size: Size

@@ -5,29 +5,37 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+from reconros_zenoh.clock.activity import Signal
+
 if TYPE_CHECKING:
     from collections.abc import Generator
-
-    import simpy
 
     from reconros_zenoh.clock.virtual import VirtualEnvironment
 
 
-class _Job:
-    __slots__ = ("done", "first", "rate", "remaining")
+class _Job(Signal):
+    """Work that is being done; fires when it is done.
 
-    def __init__(self, work: float, done: simpy.Event, *, first: bool) -> None:
+    `remaining` is what was left at `since_ns`; `due_ns` is when nothing will be, None while it waits.
+    """
+
+    __slots__ = ("due_ns", "first", "rate", "remaining", "since_ns")
+
+    def __init__(self, work: float, now_ns: int, *, first: bool) -> None:
+        super().__init__()
         self.remaining = work
-        self.done = done
+        self.since_ns = now_ns
         self.first = first
         self.rate = 0.0
+        self.due_ns: int | None = None
 
 
 class SharedResource:
     """`capacity` units of work per nanosecond, of which one job gets at most `per_job`.
 
     Jobs marked `first` are served before all others; within each group the jobs that overlap get equal shares
-    (processor sharing, the fluid limit of a time-sliced scheduler or of a round-robin bus arbiter).
+    (processor sharing, the fluid limit of a time-sliced scheduler or of a round-robin bus arbiter). A job is
+    done in the first whole nanosecond in which nothing is left of it.
     """
 
     def __init__(self, environment: VirtualEnvironment, capacity: float, per_job: float) -> None:
@@ -36,64 +44,54 @@ class SharedResource:
         self._per_job = per_job
         self._jobs: list[_Job] = []
         self._holds = 0
-        self._since_ns = environment.now
-        self._plan = 0
 
-    def serve(self, work: float, *, first: bool = False) -> Generator[simpy.Event, object, None]:
+    def serve(self, work: float, *, first: bool = False) -> Generator[Signal, object, None]:
         """Return when `work` units have been done for the caller; at once when there is none."""
         if work <= 0:
             return
-        self._advance()
-        job = _Job(work, self._environment.event(), first=first)
+        job = _Job(work, self._environment.now, first=first)
         self._jobs.append(job)
         self._share()
-        yield job.done
+        yield job
 
     def hold_first(self) -> None:
         """Stop serving the jobs marked `first` until as many `release_first`; their work waits."""
-        self._advance()
         self._holds += 1
         self._share()
 
     def release_first(self) -> None:
         """Take back one `hold_first`."""
-        self._advance()
         self._holds -= 1
         self._share()
 
-    def _advance(self) -> None:
-        """Account for the work done since the shares last changed; whoever is through leaves."""
-        elapsed_ns = self._environment.now - self._since_ns
-        self._since_ns = self._environment.now
-        if not elapsed_ns:
-            return
-        for job in self._jobs:
-            job.remaining -= job.rate * elapsed_ns
-        # Whole nanoseconds: what is left of the last one counts as done.
-        finished = [job for job in self._jobs if job.remaining < job.rate]
-        self._jobs = [job for job in self._jobs if job.remaining >= job.rate]
-        for job in finished:
-            job.done.succeed()
-
     def _share(self) -> None:
-        """Give every job its rate and plan the next completion."""
-        self._plan += 1
-        left = self._capacity
-        first = [job for job in self._jobs if job.first]
-        for group in (first, [job for job in self._jobs if not job.first]):
-            if not group:
-                continue
-            rate = min(self._per_job, left / len(group))
-            if group is first and self._holds:
-                rate = 0.0
-            for job in group:
-                job.rate = rate
-            left -= rate * len(group)
-        delays = [job.remaining / job.rate for job in self._jobs if job.rate > 0]
-        if delays:
-            self._environment.call_later(max(1, math.ceil(min(delays))), self._complete, self._plan)
+        """Give every job its rate, and a new completion where that changes."""
+        first = sum(job.first for job in self._jobs)
+        others = len(self._jobs) - first
+        rate_first = 0.0 if self._holds or not first else min(self._per_job, self._capacity / first)
+        left = self._capacity - rate_first * first
+        rate_others = min(self._per_job, left / others) if others else 0.0
+        for job in self._jobs:
+            rate = rate_first if job.first else rate_others
+            if rate != job.rate:
+                self._plan(job, rate)
 
-    def _complete(self, plan: int) -> None:
-        if plan == self._plan:  # else the shares have changed since
-            self._advance()
+    def _plan(self, job: _Job, rate: float) -> None:
+        now_ns = self._environment.now
+        if job.due_ns == now_ns:
+            return  # all of its work is done: it need not wait for anybody who comes in the same nanosecond
+        job.remaining -= job.rate * (now_ns - job.since_ns)
+        job.since_ns = now_ns
+        job.rate = rate
+        job.due_ns = None
+        if rate > 0:
+            delay_ns = max(0, math.ceil(job.remaining / rate))
+            job.due_ns = now_ns + delay_ns
+            self._environment.call_later(delay_ns, self._complete, job)
+
+    def _complete(self, job: _Job) -> None:
+        if job.due_ns == self._environment.now:  # else its rate has changed since
+            job.due_ns = None
+            self._jobs.remove(job)
             self._share()
+            job.fire()

@@ -10,7 +10,7 @@ from reconros_zenoh.clock.activity import Activity
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator
 
-    import simpy
+    from reconros_zenoh.clock.activity import Awaitable
 
 T = TypeVar("T")
 
@@ -21,7 +21,7 @@ class Stream(Generic[T]):
     At most `depth` wait; a further one pushes the oldest out (KEEP_LAST) and is counted in `dropped`.
     """
 
-    def __init__(self, process: Callable[[T], Generator[simpy.Event, object, object]], depth: int) -> None:
+    def __init__(self, process: Callable[[T], Generator[Awaitable, object, object]], depth: int) -> None:
         self._process = process
         self._waiting: deque[T] = deque(maxlen=depth)
         self._activity = Activity(self._run())
@@ -34,7 +34,7 @@ class Stream(Generic[T]):
         self._waiting.append(item)
         self._activity.resume()
 
-    def _run(self) -> Generator[simpy.Event | None, object, None]:
+    def _run(self) -> Generator[Awaitable | None, object, None]:
         while True:
             while self._waiting:
                 yield from self._process(self._waiting.popleft())

@@ -12,13 +12,12 @@ from reconros_zenoh.executor.resource_mask import SOFTWARE
 if TYPE_CHECKING:
     from collections.abc import Generator
 
-    import simpy
-
     from reconros_zenoh.board.callback import HardwareImplementation, SoftwareCallback
     from reconros_zenoh.board.endpoints import Event
     from reconros_zenoh.board.executor import Executor
     from reconros_zenoh.board.slots import ReconfigurableSlot
-    from reconros_zenoh.executor.callbacks import CallbackEntry, Dispatch
+    from reconros_zenoh.clock.activity import Awaitable
+    from reconros_zenoh.executor.callbacks import Dispatch
 
 
 class Worker(ABC):
@@ -32,30 +31,28 @@ class Worker(ABC):
         self._executor = executor
         self._board = executor.board
         self._environment = executor.board.environment
-        self._resource = resource
+        self.resource = resource
         self._poll_ns = poll_ns
         self._activity = Activity(self._run())
 
-    def wake(self, entry: CallbackEntry) -> None:
-        """Say that the callback of this entry may have become ready."""
-        if self._resource in entry.mask:
-            self._activity.resume()
+    def wake(self) -> None:
+        """Say that a callback which this worker may run has become ready."""
+        self._activity.resume()
 
-    def _run(self) -> Generator[simpy.Event | None, object, None]:
+    def _run(self) -> Generator[Awaitable | None, object, None]:
         while True:
-            dispatch = self._executor.select(self, self._resource)
+            dispatch = self._executor.select(self, self.resource)
             if dispatch is None:
                 dispatch = yield from self._wait()
             event = cast("Event", dispatch.message)
             event.timeline.callback = dispatch.entry.name
             try:
                 response = yield from self._execute(dispatch, event)
-            except Exception as error:  # noqa: BLE001 - a callback may raise anything; the board goes on
-                self._executor.fail(dispatch, event, error)
-            else:
                 self._executor.complete(dispatch, event, response)
+            except Exception as error:  # noqa: BLE001 - a callback may raise or return anything; the board goes on
+                self._executor.fail(dispatch, event, error)
 
-    def _wait(self) -> Generator[simpy.Event | None, object, Dispatch]:
+    def _wait(self) -> Generator[Awaitable | None, object, Dispatch]:
         idle_since_ns = self._environment.now
         while True:
             yield None
@@ -63,12 +60,12 @@ class Worker(ABC):
                 missed_ns = (self._environment.now - idle_since_ns) % self._poll_ns
                 if missed_ns:
                     yield self._environment.timeout(self._poll_ns - missed_ns)
-            dispatch = self._executor.select(self, self._resource)
+            dispatch = self._executor.select(self, self.resource)
             if dispatch is not None:
                 return dispatch
 
     @abstractmethod
-    def _execute(self, dispatch: Dispatch, event: Event) -> Generator[simpy.Event, object, object]:
+    def _execute(self, dispatch: Dispatch, event: Event) -> Generator[Awaitable, object, object]:
         """Run the callback to completion and return what it returned."""
 
 
@@ -78,7 +75,7 @@ class SoftwareWorker(Worker):
     def __init__(self, executor: Executor, poll_ns: int) -> None:
         super().__init__(executor, SOFTWARE, poll_ns)
 
-    def _execute(self, dispatch: Dispatch, event: Event) -> Generator[simpy.Event, object, object]:
+    def _execute(self, dispatch: Dispatch, event: Event) -> Generator[Awaitable, object, object]:
         board, timeline = self._board, event.timeline
         yield from board.cpu.run(self._executor.dispatch_ns)
         timeline.mark("dispatch")
@@ -106,7 +103,7 @@ class HardwareWorker(Worker):
         super().__init__(executor, slot.slot_id, poll_ns)
         self._slot = slot
 
-    def _execute(self, dispatch: Dispatch, event: Event) -> Generator[simpy.Event, object, object]:
+    def _execute(self, dispatch: Dispatch, event: Event) -> Generator[Awaitable, object, object]:
         board, timeline = self._board, event.timeline
         yield from board.cpu.run(self._executor.dispatch_ns)
         timeline.mark("dispatch")
@@ -124,6 +121,11 @@ class HardwareWorker(Worker):
             timeline=timeline,
         )
         try:
-            return (yield from implementation.callback(thread))
+            response = yield from implementation.callback(thread)
+            if event.responder is not None:
+                # Sending the response is a call through the delegate, as publishing is.
+                yield from board.osif.call()
+                timeline.mark("osif")
+            return response
         finally:
             self._slot.busy_ns += self._environment.now - started_ns

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from reconros_zenoh.board.cpu import Cpu
     from reconros_zenoh.board.profile import DdsSection, IcapSection
     from reconros_zenoh.board.slots import ReconfigurableSlot
+    from reconros_zenoh.clock.activity import Awaitable
     from reconros_zenoh.clock.virtual import VirtualEnvironment
 
 
@@ -59,7 +60,7 @@ class ZyCAP:
 
     def write_bitstream(
         self, slot: ReconfigurableSlot, bitstream: Bitstream
-    ) -> Generator[simpy.Event, object, None]:
+    ) -> Generator[Awaitable, object, None]:
         """Return when the slot holds the bitstream; at once if and only if it does already."""
         if slot.holds == bitstream:
             return

@@ -1,23 +1,49 @@
-"""A process that goes on at once when it is called, without an event in between."""
+"""Processes that go on at once when they are called, without an event in between."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any, TypeAlias, cast
 
 if TYPE_CHECKING:
-    from collections.abc import Generator
+    from collections.abc import Callable, Generator
 
     import simpy
+
+
+class Signal:
+    """Something to wait for that happens once; who waits goes on within `fire`.
+
+    It stands wherever a `simpy.Event` could be yielded, and takes no place in the queue of events.
+    """
+
+    __slots__ = ("callbacks",)
+    ok = True
+    value = None
+
+    def __init__(self) -> None:
+        self.callbacks: list[Callable[[Any], None]] | None = []
+
+    def fire(self) -> None:
+        """Let it happen."""
+        callbacks, self.callbacks = self.callbacks, None
+        for callback in callbacks or ():
+            callback(self)
+
+
+Awaitable: TypeAlias = "simpy.Event | Signal"
+"""What a process may yield to wait for it."""
 
 
 class Activity:
     """Drives a generator like `simpy.Process`, from the moment it is made.
 
-    The generator yields events to wait for, or None to park until `resume`. A `simpy.Process` needs an event to
-    begin and another to be woken; in wall time those are most of what a message costs.
+    The generator yields events and signals to wait for, or None to park until `resume`. A `simpy.Process`
+    needs an event to begin and another to be woken; in wall time those are most of what a message costs.
     """
 
-    def __init__(self, generator: Generator[simpy.Event | None, Any, object]) -> None:
+    __slots__ = ("_generator", "parked")
+
+    def __init__(self, generator: Generator[Awaitable | None, Any, object]) -> None:
         self._generator = generator
         self.parked = True
         self.resume()
@@ -28,8 +54,8 @@ class Activity:
             self.parked = False
             self._advance(None)
 
-    def _advance(self, event: simpy.Event | None) -> None:
-        """Run the generator until it parks, ends, or waits for an event that has not happened."""
+    def _advance(self, event: Awaitable | None) -> None:
+        """Run the generator until it parks, ends, or waits for something that has not happened."""
         while True:
             try:
                 if event is None:
@@ -37,7 +63,7 @@ class Activity:
                 elif event.ok:
                     waited_for = self._generator.send(event.value)
                 else:
-                    event.defused = True
+                    cast("simpy.Event", event).defused = True
                     waited_for = self._generator.throw(cast("BaseException", event.value))
             except StopIteration:
                 return

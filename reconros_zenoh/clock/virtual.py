@@ -18,7 +18,6 @@ class VirtualEnvironment(simpy.Environment):
 
     def __init__(self, initial_time_ns: int = 0) -> None:
         super().__init__(initial_time_ns)
-        self.steps = 0
 
     @property
     def now(self) -> int:
@@ -42,11 +41,6 @@ class VirtualEnvironment(simpy.Environment):
             function(*arguments)
 
         timeout.callbacks.append(call)
-
-    def step(self) -> None:
-        """Process the next event."""
-        self.steps += 1
-        super().step()
 
 
 def succeed_once(event: simpy.Event) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import gc
 import sys
 import threading
 import time
@@ -12,17 +13,19 @@ from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
-import simpy
 
 from reconros_zenoh.clock.virtual import VirtualEnvironment
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    import simpy
+
 _SPIN_NS = 100_000
 _TURN_NS = 1_000_000
 _PR_SET_TIMERSLACK = 29
 _LAGS_KEPT = 1 << 16
+_OBJECTS_BETWEEN_COLLECTIONS = 50_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,13 +41,13 @@ class Lag:
 class WallEnvironment(VirtualEnvironment):
     """A VirtualEnvironment in which no event happens before its time on the monotonic clock.
 
-    `now` is the due time of what is being done, so a late event does not delay what follows from it: the model
-    does not drift, the loop catches up. Calls come in from any thread through `post`.
+    `now` is the due time of what is being done, so a late event does not delay what follows from it: the
+    model does not drift, the loop catches up. Calls come in from any thread through `post`.
 
-    The loop belongs to whoever has the turn. The thread in `run` takes it when the next event is due: it sleeps until
-    then, the last tenth of a millisecond it spins, because a sleep ends about that much late. A thread that posts
-    takes the turn itself when it is free and does what is due, for to wake another thread takes longer than most
-    messages do. Before `run` and after it nobody has the turn: posted calls wait.
+    The loop belongs to whoever has the turn. The thread in `run` takes it when the next event is due: it
+    sleeps until then, the last tenth of a millisecond it spins, because a sleep ends about that much late. A
+    thread that posts takes the turn itself when it is free and does what is due, for to wake another thread
+    takes longer than most messages do. Before `run` and after it nobody has the turn: posted calls wait.
     """
 
     def __init__(self) -> None:
@@ -79,7 +82,7 @@ class WallEnvironment(VirtualEnvironment):
                 return
 
     def run(self, until: simpy.Event) -> Any:  # type: ignore[override] # only until an event
-        """Keep the loop going until the event has happened, and return its value; raise what it failed with."""
+        """Keep the loop going until the event has happened and return its value, or raise its error."""
         if until.callbacks is not None:
             # It may happen in another thread's turn.
             until.callbacks.append(lambda _: self._alarm.put(None))
@@ -87,7 +90,8 @@ class WallEnvironment(VirtualEnvironment):
         try:
             while not until.processed:
                 with self._turn:
-                    next_due = self._catch_up(float("inf"))
+                    # A turn at a time: a loop that never catches up ends too.
+                    next_due = self._catch_up(time.monotonic_ns() + _TURN_NS)
                 if not until.processed:
                     self._sleep(next_due)
                 if self._failure is not None:
@@ -106,7 +110,7 @@ class WallEnvironment(VirtualEnvironment):
         p50, p99 = np.percentile(lags, (50, 99)) / 1e3
         return Lag(len(lags), float(p50), float(p99), float(lags.max()) / 1e3)
 
-    def _catch_up(self, deadline_ns: float) -> float:
+    def _catch_up(self, deadline_ns: int) -> float:
         """Do what is due, in the order of time, and return when the next event is; called with the turn.
 
         At the deadline it stops with work left, and returns a time that has passed.
@@ -137,7 +141,7 @@ class WallEnvironment(VirtualEnvironment):
                 continue
             self._asleep_until = until_ns
             # A thread whose turn ended before the line above could not see how long we sleep.
-            if self.peek() < until_ns:
+            if self._failure is not None or self.peek() < until_ns:
                 return
             try:
                 # Without an event ahead only an alarm can end the sleep.
@@ -148,10 +152,13 @@ class WallEnvironment(VirtualEnvironment):
 
 
 def keep_time() -> None:
-    """Make this process's threads wake up punctually; called once by a daemon before it starts any thread.
+    """Make this process punctual; called once by a daemon before it starts any thread.
 
-    Linux delays timers by up to 50 us to save wake-ups, and CPython hands the interpreter over every 5 ms only.
+    Linux delays timers by up to 50 us to save wake-ups, CPython hands the interpreter over every 5 ms only,
+    and its garbage collector would look through everything that was imported time and again.
     """
+    gc.freeze()
+    gc.set_threshold(_OBJECTS_BETWEEN_COLLECTIONS)
     sys.setswitchinterval(0.0005)
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PR_SET_TIMERSLACK, 1, 0, 0, 0)

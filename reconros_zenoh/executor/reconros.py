@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from reconros_zenoh.executor.callbacks import CallbackKind, CallbackLists, lowest
 
 if TYPE_CHECKING:
-    from reconros_zenoh.executor.callbacks import CallbackEntry, CallbackList, Dispatch
+    from reconros_zenoh.executor.callbacks import CallbackEntry, Dispatch
 
 _WITH_POSITION = (CallbackKind.SUB, CallbackKind.SRV, CallbackKind.CLT)
 
@@ -60,22 +60,22 @@ class ReconrosExecutor:
         """Return the callback that this worker of `resource` must run now, or None when none is ready."""
         timers = self.callbacks[CallbackKind.TMR].ready(resource)
         if timers:
-            return self._take(self.callbacks[CallbackKind.TMR], lowest(timers), resource)
+            return self._take(CallbackKind.TMR, lowest(timers), resource)
+        ready = [(kind, self.callbacks[kind].ready(resource)) for kind in _WITH_POSITION]
         offsets = self._offsets.get(worker)
         if offsets is None:
             offsets = self._offsets[worker] = OffsetVector(self.callbacks)
         # Twice: the first round may only have wrapped every Position.
         for _ in range(2):
-            for kind in _WITH_POSITION:
-                callbacks = self.callbacks[kind]
-                index = offsets.search(kind, callbacks.ready(resource))
+            for kind, entries in ready:
+                index = offsets.search(kind, entries)
                 if index is not None:
-                    return self._take(callbacks, index, resource)
+                    return self._take(kind, index, resource)
         return None
 
     def finish(self, dispatch: Dispatch) -> None:
         """Note that the dispatched callback has run to completion."""
         self.callbacks.finish(dispatch)
 
-    def _take(self, callbacks: CallbackList, index: int, resource: int) -> Dispatch:
-        return self.callbacks.take(callbacks[index], resource)
+    def _take(self, kind: CallbackKind, index: int, resource: int) -> Dispatch:
+        return self.callbacks.take(self.callbacks[kind][index], resource)

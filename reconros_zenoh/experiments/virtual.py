@@ -15,6 +15,7 @@ from reconros_zenoh.experiments.roundtrip import CLIENTS, BoardReport, applicati
 from reconros_zenoh.measure.record import RecordWriter
 from reconros_zenoh.project.loader import load_project
 from reconros_zenoh.rmw.node import Context
+from reconros_zenoh.transport.memory import tune_malloc
 from reconros_zenoh.transport.simulated import SimulatedNetwork
 
 if TYPE_CHECKING:
@@ -28,6 +29,7 @@ LIMIT_NS = 2_000_000_000
 
 def run_virtual(plan: Plan, report: BoardReport, on_progress: Callable[[str, str], None]) -> None:
     """Record the round trips of each mapping; `on_progress(mapping, client)` is called after each of them."""
+    tune_malloc()
     for name in plan.mappings:
         _run_mapping(plan, name, report, on_progress)
 

@@ -61,7 +61,7 @@ class Request(Protocol):
         """The attachment it was sent with."""
 
     def read(self) -> memoryview:
-        """Copy the payload out of the transport, as `Sample.read` does."""
+        """Copy the payload out of the transport, as `Sample.read` does; before the reply."""
 
     def reply(self, parts: Parts, attachment: bytes | None) -> None:
         """Answer it; without effect when the client no longer waits."""
@@ -151,7 +151,7 @@ class Transport(Protocol):
         """
 
     def close(self) -> None:
-        """Close every declaration and leave the network. Idempotent."""
+        """Close every declaration and leave the network. Idempotent; not to be called by a sink."""
 
     def __enter__(self) -> Self: ...
 

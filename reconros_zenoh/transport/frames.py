@@ -40,6 +40,7 @@ class Frames(Generic[_Frame]):
         self._lock = Lock()
         self._pools: list[Callable[[int], _Frame | None]] = []
         self._pool_bytes = 0
+        self._limit_bytes = _LARGEST_POOL_BYTES
 
     def join(self, parts: Parts) -> bytes | _Frame:
         """Return `parts` in one piece: in a frame when that is faster and there is one."""
@@ -66,11 +67,12 @@ class Frames(Generic[_Frame]):
 
     def _grow(self, size: int) -> bool:
         """Whether there is now a pool for frames of `size` bytes."""
-        if size * _FRAMES > _LARGEST_POOL_BYTES:
+        if size * _FRAMES > self._limit_bytes:
             return False
         pool_bytes = 1 << (size * _FRAMES - 1).bit_length()
         pool = self._open_pool(pool_bytes + _MIB)  # a pool keeps some for itself
         if pool is None:
+            self._limit_bytes = size * _FRAMES - 1  # as much is not asked for again
             return False
         self._pools.append(pool)  # the last frames of the smaller ones may still be on their way
         self._pool_bytes = pool_bytes

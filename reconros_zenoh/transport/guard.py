@@ -37,7 +37,7 @@ class Closing:
 class GuardedDeclaration:
     """A declaration whose callbacks run one at a time and never once `close` has returned.
 
-    A subclass calls them through `call` and says in `_withdraw` how it leaves the network.
+    A subclass calls them through `call` and says in `withdraw` how it leaves the network.
     """
 
     __slots__ = ("_closed", "_failed", "_key", "_lock")
@@ -66,12 +66,17 @@ class GuardedDeclaration:
             raise TransportError(f"{self._key} is closed: nothing can be sent on it any more")
 
     def close(self) -> None:
-        """Leave the network; waits for a callback that runs on another thread. Idempotent."""
-        with self._lock:
-            if self._closed:
-                return
-            self._closed = True
-        self._withdraw()
+        """Leave the network. Idempotent."""
+        if self.shut():
+            self.withdraw()
 
-    def _withdraw(self) -> None:
+    def shut(self) -> bool:
+        """Stop the callbacks and wait for one that runs on another thread; False if they were stopped."""
+        with self._lock:
+            was_open = not self._closed
+            self._closed = True
+        return was_open
+
+    def withdraw(self) -> None:
+        """Leave the network; called once, after `shut`."""
         raise NotImplementedError

@@ -113,7 +113,7 @@ class _Declaration(GuardedDeclaration):
         self.network, self._mine = home
         self._mine[self] = None
 
-    def _withdraw(self) -> None:
+    def withdraw(self) -> None:
         del self._mine[self]
 
     def post(self, callback: Callable[..., None], *arguments: object) -> None:
@@ -179,8 +179,8 @@ class _Publisher(_Matcher):
         for subscription in self._route:
             subscription.post(subscription.sink, sample)
 
-    def _withdraw(self) -> None:
-        super()._withdraw()
+    def withdraw(self) -> None:
+        super().withdraw()
         del self.network.publishers[self]
 
 
@@ -202,8 +202,8 @@ class _Subscription(_Declaration):
             publisher.find_route()
         return publishers
 
-    def _withdraw(self) -> None:
-        super()._withdraw()
+    def withdraw(self) -> None:
+        super().withdraw()
         del self.network.subscriptions[self]
         self._tell_publishers()
 
@@ -290,8 +290,8 @@ class _Querier(_Matcher):
         # Without a server it is over at once, but never from within this call.
         self.network.environment.call_later(timeout_ns if self._route else 0, exchange.finish)
 
-    def _withdraw(self) -> None:
-        super()._withdraw()
+    def withdraw(self) -> None:
+        super().withdraw()
         del self.network.queriers[self]
 
 
@@ -309,8 +309,8 @@ class _Server(_Declaration):
             if intersects(querier.key, self.key):
                 querier.find_route()
 
-    def _withdraw(self) -> None:
-        super()._withdraw()
+    def withdraw(self) -> None:
+        super().withdraw()
         del self.network.servers[self]
         self._tell_queriers()
 
@@ -330,8 +330,8 @@ class _Token(_Declaration):
             for watch in self.network.watches:
                 watch.report((self.key,), alive=alive)
 
-    def _withdraw(self) -> None:
-        super()._withdraw()
+    def withdraw(self) -> None:
+        super().withdraw()
         del self.network.tokens[self]
         self._tell_watches(alive=False)
 
@@ -351,8 +351,8 @@ class _Watch(_Declaration):
             if intersects(self.key, token):
                 self.post(self._on_change, token, alive)
 
-    def _withdraw(self) -> None:
-        super()._withdraw()
+    def withdraw(self) -> None:
+        super().withdraw()
         del self.network.watches[self]
 
 

@@ -1,17 +1,21 @@
 """What the board adds to a message: client -> board -> client against a raw zenoh-python ping-pong.
 
-Both sides read every byte they get and send the same bytes; both use the same malloc settings; both echo
-processes are found through the same router. The board is one with the native profile and one software worker, whose
-callback gets the decoded message and publishes it. Rounds of both alternate in one run.
+Both sides read every byte they get and send as many; both use the same malloc settings; both find each other
+through the same router, and rounds of both alternate in one run. The rival has Zenoh's own defaults; our
+processes have what our transport sets for every process, its thread pools included (transport/zenoh.py). The
+board has the native profile and one software worker, whose callback gets the decoded message and publishes
+it.
 """
 
 from __future__ import annotations
 
+import os
 import statistics
 import subprocess
 import sys
 import threading
 import time
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from queue import SimpleQueue
 from typing import TYPE_CHECKING, Any
@@ -23,13 +27,12 @@ from table import arguments, free_port, print_result
 from host_clients.image import image_message
 from reconros_zenoh.clock.wall import keep_time
 from reconros_zenoh.rmw.node import Context
-from reconros_zenoh.ros.qos import QosProfile
 from reconros_zenoh.ros.types import TypeRegistry
 from reconros_zenoh.transport.memory import tune_malloc
 from reconros_zenoh.transport.zenoh import ZenohRouter, ZenohTransport
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
 
 ECHO = Path(__file__).parent / "echo"
 ROUNDS = 5
@@ -37,7 +40,7 @@ LIMIT_S = 20.0
 
 
 def raw_session(router: str) -> zenoh.Session:
-    """Return a session configured as the project's are."""
+    """Return a session that finds its peers as the project's do, everything else as zenoh has it."""
     config = zenoh.Config()
     config.insert_json5("mode", '"peer"')
     config.insert_json5("connect/endpoints", f'["{router}"]')
@@ -51,11 +54,36 @@ def raw_echo(router: str) -> None:
     tune_malloc()
     with raw_session(router) as session:
         publisher = session.declare_publisher("raw/out", congestion_control=zenoh.CongestionControl.DROP)
-        session.declare_subscriber(
-            "raw/in", zenoh.handlers.Callback(lambda sample: publisher.put(sample.payload.to_bytes()), indirect=False)
-        )
+
+        def on_sample(sample: zenoh.Sample) -> None:
+            publisher.put(sample.payload.to_bytes())
+
+        session.declare_subscriber("raw/in", zenoh.handlers.Callback(on_sample, indirect=False))
         print("ready", flush=True)
         sys.stdin.read()
+
+
+def raw_client(router: str) -> None:
+    """For each line `bytes count` on stdin print the median round trip [us]: the rival's client process."""
+    keep_time()
+    tune_malloc()
+    answers: SimpleQueue[int] = SimpleQueue()
+
+    def on_sample(sample: zenoh.Sample) -> None:
+        sample.payload.to_bytes()
+        answers.put(time.perf_counter_ns())
+
+    with raw_session(router) as session:
+        session.declare_subscriber("raw/out", zenoh.handlers.Callback(on_sample, indirect=False))
+        publisher = session.declare_publisher("raw/in", congestion_control=zenoh.CongestionControl.DROP)
+        while not publisher.matching_status.matching:
+            time.sleep(0.01)
+        print("ready", flush=True)
+        for line in sys.stdin:
+            size, count = map(int, line.split())
+            payload = os.urandom(size)
+            times = ping(lambda payload=payload: publisher.put(payload), answers, count)
+            print(statistics.median(times), flush=True)
 
 
 def ping(send: Callable[[], None], answers: SimpleQueue[int], count: int) -> list[float]:
@@ -84,81 +112,82 @@ def main() -> None:
     """Run the benchmark."""
     parser = arguments(__doc__ or "")
     parser.add_argument("--raw-echo", metavar="ROUTER", help="be the rival's echo process")
+    parser.add_argument("--raw-client", metavar="ROUTER", help="be the rival's client process")
     given = parser.parse_args()
     if given.raw_echo:
         raw_echo(given.raw_echo)
-        return
+    elif given.raw_client:
+        raw_client(given.raw_client)
+    else:
+        print_result("overhead", run(), as_json=given.json)
+
+
+def run() -> list[dict[str, Any]]:
+    """Start the processes of both sides and return a row per message."""
     keep_time()
     tune_malloc()
     router = f"tcp/127.0.0.1:{free_port()}"
-    with ZenohRouter.open(router):
-        board = subprocess.Popen(
-            [sys.executable, "-m", "board_daemon", str(ECHO), "--profile", "native", "--mapping", "software"]
-            + ["--name", "echo", "--router", router],
-            stdout=subprocess.PIPE,
-            text=True,
-        )
-        rival = subprocess.Popen(
-            [sys.executable, __file__, "--raw-echo", router], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
-        )
-        try:
-            assert board.stdout is not None
-            assert rival.stdout is not None
-            board.stdout.readline()
-            rival.stdout.readline()
-            rows = measure(router)
-        finally:
-            for process in (board, rival):
-                process.terminate()
-                process.wait()
-    print_result("overhead", rows, as_json=given.json)
+    board = ["-m", "board_daemon", str(ECHO), "--profile=native", "--mapping=software", "--name=echo"]
+    # What our transport sets for its own process must not reach the rival's.
+    plain = {name: value for name, value in os.environ.items() if name != "ZENOH_RUNTIME"}
+    with ExitStack() as stack:
+        stack.enter_context(ZenohRouter.open(router))
+        stack.enter_context(child([*board, "--router", router], plain))
+        stack.enter_context(child([__file__, "--raw-echo", router], plain))
+        rival = stack.enter_context(child([__file__, "--raw-client", router], plain))
+        return measure(router, rival)
 
 
-def measure(router: str) -> list[dict[str, Any]]:
-    """Return a row per message."""
+@contextmanager
+def child(words: list[str], environment: dict[str, str]) -> Iterator[subprocess.Popen[str]]:
+    """Run a Python process that says when it is ready, and end it at the end."""
+    process = subprocess.Popen(
+        [sys.executable, *words], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=environment
+    )
+    try:
+        assert process.stdout is not None
+        assert process.stdout.readline(), f"{words} did not start"
+        yield process
+    finally:
+        process.terminate()
+        process.wait()
+
+
+def measure(router: str, rival: subprocess.Popen[str]) -> list[dict[str, Any]]:
+    """Return a row per message; rounds of both sides alternate."""
+    assert rival.stdin is not None
+    assert rival.stdout is not None
     types = TypeRegistry()
     answers: SimpleQueue[int] = SimpleQueue()
     rows = []
-    with ZenohTransport.open(router) as transport, raw_session(router) as raw:
+    with ZenohTransport.open(router) as transport:
         node = Context(transport).node("overhead_client")
         publishers = {}
         for topic, type_name in (("number", "std_msgs/msg/UInt32"), ("image", "sensor_msgs/msg/Image")):
             matched = threading.Event()
             message_type = types.message(type_name)
-            node.subscription(
-                message_type, f"/{topic}_out", lambda _: answers.put(time.perf_counter_ns()), QosProfile()
-            )
+            node.subscription(message_type, f"/{topic}_out", lambda _: answers.put(time.perf_counter_ns()))
             publishers[topic] = node.publisher(
                 message_type, f"/{topic}_in", on_matching=lambda yes, matched=matched: yes and matched.set()
             )
             assert matched.wait(LIMIT_S), "the board does not listen"
-
-        def on_raw(sample: zenoh.Sample) -> None:
-            sample.payload.to_bytes()
-            answers.put(time.perf_counter_ns())
-
-        raw.declare_subscriber("raw/out", zenoh.handlers.Callback(on_raw, indirect=False))
-        raw_publisher = raw.declare_publisher("raw/in", congestion_control=zenoh.CongestionControl.DROP)
         for name, topic, message, count in messages(types):
             publisher = publishers[topic]
-            payload = b"".join(publisher.message_type.encode(message))
-            sides: dict[str, Callable[[], None]] = {
-                "raw": lambda payload=payload: raw_publisher.put(payload),
-                "ours": lambda publisher=publisher, message=message: publisher.publish(message),
-            }
-            for send in sides.values():
-                ping(send, answers, 20)
-            medians: dict[str, list[float]] = {side: [] for side in sides}
-            for _ in range(ROUNDS):
-                for side, send in sides.items():
-                    medians[side].append(statistics.median(ping(send, answers, count)))
-            ratios = [ours / rival for ours, rival in zip(medians["ours"], medians["raw"], strict=True)]
+            size = sum(map(len, publisher.message_type.encode(message)))
+            raw_us, ours_us = [], []
+            for times in [20] + [count] * ROUNDS:
+                rival.stdin.write(f"{size} {times}\n")
+                rival.stdin.flush()
+                raw_us.append(float(rival.stdout.readline()))
+                ours_us.append(statistics.median(ping(lambda: publisher.publish(message), answers, times)))
+            # The first round only warms up.
+            ratios = [ours / raw for ours, raw in zip(ours_us[1:], raw_us[1:], strict=True)]
             rows.append(
                 {
                     "message": name,
-                    "bytes": len(payload),
-                    "raw_us": statistics.median(medians["raw"]),
-                    "ours_us": statistics.median(medians["ours"]),
+                    "bytes": size,
+                    "raw_us": statistics.median(raw_us[1:]),
+                    "ours_us": statistics.median(ours_us[1:]),
                     "ratio": statistics.median(ratios),
                     "ratio_min": min(ratios),
                     "ratio_max": max(ratios),

@@ -10,6 +10,7 @@ from reconros_zenoh.board.board import Board, SlotPlan
 from reconros_zenoh.board.endpoints import Event
 from reconros_zenoh.board.profile import Profile
 from reconros_zenoh.board.spans import Timeline
+from reconros_zenoh.clock.activity import Activity
 from reconros_zenoh.clock.virtual import VirtualEnvironment
 from reconros_zenoh.rmw.node import Context
 from reconros_zenoh.ros.types import TypeRegistry
@@ -21,6 +22,9 @@ if TYPE_CHECKING:
     import simpy
 
     from reconros_zenoh.board.callback import HardwareThread, SoftwareContext
+
+    Steps = Generator[Any, Any, Any]
+    """What waits for parts of a board with `yield from`."""
 
 BITSTREAM_BYTES = 1000
 """Of every slot; the ICAP takes one byte per nanosecond."""
@@ -87,6 +91,20 @@ def small_profile(
     return Profile.model_validate({"name": "small", "description": "", "model": model})
 
 
+def start(environment: VirtualEnvironment, steps: Steps) -> simpy.Event:
+    """Begin to go through the steps now; the event happens, with what they return or raise, when they end."""
+    end = environment.event()
+
+    def follow() -> Steps:
+        try:
+            end.succeed((yield from steps))
+        except Exception as error:  # noqa: BLE001 - whatever it is, it belongs to who waits for the end
+            end.fail(error)
+
+    Activity(follow())
+    return end
+
+
 def small_board(
     profile: Profile,
     slots: int = 0,
@@ -150,10 +168,10 @@ class Tickets:
 Log = list[tuple[int, str]]
 
 
-def logging_thread(log: Log, name: str) -> Callable[[HardwareThread], Generator[simpy.Event, object, None]]:
+def logging_thread(log: Log, name: str) -> Callable[[HardwareThread], Steps]:
     """A hardware callback that notes when its slot starts and is done computing."""
 
-    def thread(thread: HardwareThread) -> Generator[simpy.Event, object, None]:
+    def thread(thread: HardwareThread) -> Steps:
         log.append((thread._environment.now, f"{name} starts"))
         yield from thread.compute(int)
         log.append((thread._environment.now, f"{name} is done"))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import pytest
+from small_board import start
 
 from reconros_zenoh.board.cpu import Cpu
 from reconros_zenoh.board.memif import Memif
@@ -12,11 +13,9 @@ from reconros_zenoh.board.osif import Osif
 from reconros_zenoh.clock.virtual import VirtualEnvironment
 
 if TYPE_CHECKING:
-    from collections.abc import Generator, Iterable
+    from collections.abc import Iterable
 
-    import simpy
-
-    Work = Generator[simpy.Event, object, None]
+    from small_board import Steps
 
 
 @pytest.fixture
@@ -24,16 +23,16 @@ def environment() -> VirtualEnvironment:
     return VirtualEnvironment()
 
 
-def ends(environment: VirtualEnvironment, works: Iterable[Work]) -> list[int]:
+def ends(environment: VirtualEnvironment, works: Iterable[Steps]) -> list[int]:
     """When each of these ends [ns] if all begin now."""
     done: dict[int, int] = {}
 
-    def run(index: int, work: Work) -> Work:
+    def run(index: int, work: Steps) -> Steps:
         yield from work
         done[index] = environment.now
 
     for index, work in enumerate(works):
-        environment.process(run(index, work))
+        start(environment, run(index, work))
     environment.run()
     return [done[index] for index in sorted(done)]
 

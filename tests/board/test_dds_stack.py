@@ -6,7 +6,7 @@ import random
 from typing import TYPE_CHECKING
 
 import pytest
-from small_board import small_profile, stages
+from small_board import small_profile, stages, start
 
 from reconros_zenoh.board.cpu import Cpu
 from reconros_zenoh.board.dds import DdsStack
@@ -14,9 +14,7 @@ from reconros_zenoh.board.spans import Timeline
 from reconros_zenoh.clock.virtual import VirtualEnvironment
 
 if TYPE_CHECKING:
-    from collections.abc import Generator
-
-    import simpy
+    from small_board import Steps
 
     from reconros_zenoh.board.profile import Profile
 
@@ -61,8 +59,8 @@ class Stack:
         timeline = Timeline(self.environment, self.environment.now)
         return self._stages(self._stack.send(size, timeline), timeline)
 
-    def _stages(self, step: Generator[simpy.Event, object, None], timeline: Timeline) -> dict[str, int]:
-        self.environment.run(until=self.environment.process(step))
+    def _stages(self, step: Steps, timeline: Timeline) -> dict[str, int]:
+        self.environment.run(until=start(self.environment, step))
         assert timeline.total_ns == self.environment.now - timeline.started_ns
         return stages(timeline)
 
@@ -92,7 +90,7 @@ def test_a_sender_whose_clock_is_ahead_does_not_lengthen_the_link() -> None:
     stack = Stack()
     stack.environment.run(until=1)
     timeline = Timeline(stack.environment, 1)
-    stack.environment.run(until=stack.environment.process(stack._stack.receive(8, -400, timeline)))
+    stack.environment.run(until=start(stack.environment, stack._stack.receive(8, -400, timeline)))
     assert stages(timeline) == {"transport": 516, "dds": 124}
 
 
@@ -128,7 +126,7 @@ def test_a_small_message_is_never_lost() -> None:
 
 def test_the_stack_takes_the_core_from_a_thread() -> None:
     stack = Stack()
-    thread = stack.environment.process(stack.cpu.run(1000))
+    thread = start(stack.environment, stack.cpu.run(1000))
     assert stack.receive(0) == {"transport": 500, "dds": 100}
     stack.environment.run(until=thread)
     assert stack.environment.now == 1100

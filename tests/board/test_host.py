@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
-from small_board import Tickets, small_board, small_profile
+from small_board import Tickets, small_board, small_profile, start
 
 from reconros_zenoh.board.executor import Executor
 from reconros_zenoh.board.host import Host, Overruns
@@ -17,10 +17,9 @@ from reconros_zenoh.clock.wall import WallEnvironment
 from reconros_zenoh.executor.callbacks import CallbackKind
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Generator, Iterator
-    from concurrent.futures import Future
+    from collections.abc import Callable, Iterator
 
-    import simpy
+    from small_board import Steps
 
     from reconros_zenoh.board.callback import SoftwareContext
 
@@ -48,15 +47,13 @@ def wall_host() -> Iterator[tuple[WallEnvironment, Host]]:
     host.close()
 
 
-def late_after(
-    environment: VirtualEnvironment, host: Host, modelled_ns: int, future: Future[Any]
-) -> Generator[simpy.Event, object, Any]:
+def late_after(environment: VirtualEnvironment, host: Host, modelled_ns: int, future: Any) -> Steps:
     yield environment.timeout(modelled_ns)
     return (yield from host.late_result(future))
 
 
-def run(environment: VirtualEnvironment, process: Generator[simpy.Event, object, Any]) -> Any:
-    return environment.run(until=environment.process(process))
+def run(environment: VirtualEnvironment, process: Steps) -> Any:
+    return environment.run(until=start(environment, process))
 
 
 def test_in_virtual_time_a_result_is_there_at_once_and_never_late() -> None:
@@ -71,7 +68,7 @@ def test_in_virtual_time_a_result_is_there_at_once_and_never_late() -> None:
 def test_in_wall_time_a_result_that_is_there_in_time_is_no_overrun() -> None:
     with wall_host() as (environment, host):
         future = host.start("task", max, 3, 5)
-        future.result(LIMIT_S)
+        future.result()
         assert run(environment, late_after(environment, host, 1, future)) == 5
         assert host.overruns == Overruns()
 
@@ -139,11 +136,11 @@ def test_two_computations_run_at_the_same_time_in_wall_time() -> None:
 def test_in_wall_time_a_task_that_has_proved_short_runs_in_the_thread_of_the_event_loop() -> None:
     with wall_host() as (_, host):
         name = threading.current_thread
-        assert host.start("task", name).result(LIMIT_S) is not threading.current_thread()
+        assert host.start("task", name).result() is not threading.current_thread()
         host._expected_ns["task"] = 1000
-        assert host.start("task", name).result(LIMIT_S) is threading.current_thread()
+        assert host.start("task", name).result() is threading.current_thread()
         host._expected_ns["task"] = 1_000_000
-        assert host.start("task", name).result(LIMIT_S) is not threading.current_thread()
+        assert host.start("task", name).result() is not threading.current_thread()
 
 
 def test_in_virtual_time_equal_inputs_are_computed_once() -> None:
@@ -179,7 +176,7 @@ GRID = np.arange(6, dtype=np.uint32).reshape(2, 3)
 )
 def test_an_array_that_differs_is_computed_anew(other: Any) -> None:
     host = Host(VirtualEnvironment(), threads=None)
-    kernel = Counting(lambda array: np.shape(array))
+    kernel = Counting(np.shape)
     assert host.compute(kernel, GRID) == (2, 3)
     assert host.compute(kernel, other) == np.shape(other)
     assert kernel.calls == 2

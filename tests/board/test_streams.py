@@ -8,9 +8,7 @@ from reconros_zenoh.board.stream import Stream
 from reconros_zenoh.clock.virtual import VirtualEnvironment
 
 if TYPE_CHECKING:
-    from collections.abc import Generator
-
-    import simpy
+    from small_board import Steps
 
 
 class SlowStream:
@@ -21,7 +19,7 @@ class SlowStream:
         self.log: list[tuple[int, str]] = []
         self.stream = Stream(self._process, depth)
 
-    def _process(self, item: str) -> Generator[simpy.Event, object, None]:
+    def _process(self, item: str) -> Steps:
         self.log.append((self.environment.now, f"{item} begins"))
         yield self.environment.timeout(100)
         self.log.append((self.environment.now, f"{item} ends"))

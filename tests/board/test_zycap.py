@@ -7,15 +7,14 @@ from typing import TYPE_CHECKING
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from small_board import BITSTREAM_BYTES, small_board, small_profile
+from small_board import BITSTREAM_BYTES, small_board, small_profile, start
 
 from reconros_zenoh.board.bitstream import Bitstream
 from reconros_zenoh.errors import UsageError
 
 if TYPE_CHECKING:
-    from collections.abc import Generator
-
     import simpy
+    from small_board import Steps
 
     from reconros_zenoh.board.board import Board
 
@@ -38,11 +37,11 @@ def board_with_slots(slots: int, *, stalled: bool = False, cores: int = 1, dds_m
 
 
 def write(board: Board, log: list[tuple[int, str]], slot: int, callback: str) -> simpy.Event:
-    def run() -> Generator[simpy.Event, object, None]:
+    def run() -> Steps:
         yield from board.zycap.write_bitstream(board.slots[slot], Bitstream(slot, callback, BITSTREAM_BYTES))
         log.append((board.environment.now, f"slot {slot} holds {callback}"))
 
-    return board.environment.process(run())
+    return start(board.environment, run())
 
 
 def test_a_write_takes_the_size_over_the_bandwidth_and_the_offset_and_then_the_slot_settles() -> None:
@@ -122,7 +121,8 @@ def test_a_slot_is_written_if_and_only_if_it_does_not_hold_that_bitstream(
 @pytest.mark.parametrize(
     ("stalled", "expected"),
     [
-        # The stack has the core until 100, then from the end of the write, 100 ns before the slot has settled.
+        # The stack has the core until 100, then from the end of the write, 100 ns before the slot has
+        # settled.
         (True, [(700, "thread"), (WRITE_NS + 100, "message"), (WRITE_NS + SETTLE_NS, "slot 0 holds sobel")]),
         (False, [(200, "message"), (800, "thread"), (WRITE_NS + SETTLE_NS, "slot 0 holds sobel")]),
     ],
@@ -134,14 +134,14 @@ def test_the_communication_stack_stalls_during_a_write_if_the_profile_says_so(
     board = board_with_slots(1, stalled=stalled)
     log: list[tuple[int, str]] = []
 
-    def work(name: str, run: Generator[simpy.Event, object, None]) -> Generator[simpy.Event, object, None]:
+    def work(name: str, run: Steps) -> Steps:
         yield board.environment.timeout(100)
         yield from run
         log.append((board.environment.now, name))
 
     write(board, log, 0, "sobel")
-    board.environment.process(work("message", board.cpu.run_stack(100)))
-    board.environment.process(work("thread", board.cpu.run(600)))
+    start(board.environment, work("message", board.cpu.run_stack(100)))
+    start(board.environment, work("thread", board.cpu.run(600)))
     board.environment.run()
     assert sorted(log) == sorted(expected)
 
@@ -150,14 +150,14 @@ def test_the_stack_goes_on_between_two_writes_while_the_first_slot_settles() -> 
     board = board_with_slots(2, stalled=True)
     log: list[tuple[int, str]] = []
 
-    def message() -> Generator[simpy.Event, object, None]:
+    def message() -> Steps:
         yield from board.cpu.run_stack(60)
         log.append((board.environment.now, "message"))
 
     write(board, log, 0, "sobel")
     write(board, log, 1, "sobel")
     board.environment.run(until=1)
-    board.environment.process(message())
+    start(board.environment, message())
     board.environment.run()
     # 40 ns of it while slot 0 settles, the other 20 ns after the second write.
     assert log == [

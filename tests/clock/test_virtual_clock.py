@@ -2,18 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from reconros_zenoh.clock.virtual import VirtualEnvironment, succeed_once
-
-if TYPE_CHECKING:
-    from collections.abc import Generator
-
-    import simpy
 
 HOUR_NS = 3_600 * 10**9
 
@@ -98,34 +91,6 @@ def test_an_error_in_a_call_ends_the_run_and_leaves_the_rest_to_the_next() -> No
     assert calls == []
     environment.run()
     assert calls == ["after"]
-
-
-def test_steps_counts_the_events_processed() -> None:
-    environment = VirtualEnvironment()
-    assert environment.steps == 0
-    for delay in (0, 1, 1, 20):
-        environment.call_later(delay, lambda: None)
-    assert environment.steps == 0
-    environment.run()
-    assert environment.steps == 4
-
-
-def test_the_same_model_takes_the_same_steps() -> None:
-    def model() -> VirtualEnvironment:
-        environment = VirtualEnvironment()
-
-        def process() -> Generator[simpy.Event, object, None]:
-            for delay in (3, 1, 4):
-                yield environment.timeout(delay)
-
-        for _ in range(2):
-            environment.process(process())
-        environment.run()
-        return environment
-
-    first, second = model(), model()
-    assert (first.steps, first.now) == (second.steps, second.now)
-    assert first.now == 8
 
 
 def test_succeed_once_lets_an_event_happen_and_then_does_nothing() -> None:

@@ -35,12 +35,12 @@ class Inbox:
 
     def __init__(self, changed: Condition) -> None:
         self.items: list[Any] = []
-        self._changed = changed
+        self.changed = changed
 
     def put(self, *item: Any) -> None:
-        with self._changed:
+        with self.changed:
             self.items.append(item[0] if len(item) == 1 else item)
-            self._changed.notify_all()
+            self.changed.notify_all()
 
     def put_text(self, sample: Sample) -> None:
         self.put(bytes(sample.read()).decode())
@@ -600,6 +600,30 @@ def test_a_session_has_the_id_that_graph_tokens_need(network: Network) -> None:
     ids = [network.session().session_id for _ in range(2)]
     assert all(re.fullmatch("[1-9a-f][0-9a-f]{0,31}", session_id) for session_id in ids)
     assert ids[0] != ids[1]
+
+
+def test_a_publisher_is_closed_while_another_thread_sends(router: str) -> None:
+    with ZenohTransport.open(router) as session:
+        inbox = Inbox(Condition())
+        publisher = session.publish(KEY, DEFAULT)
+        refused = []
+
+        def send_until_refused() -> None:
+            while not refused:
+                try:
+                    publisher.put([bytes(100_000)], None)
+                except TransportError as error:
+                    refused.append(error)
+                inbox.put(None)
+
+        thread = Thread(target=send_until_refused, daemon=True)
+        thread.start()
+        with inbox.changed:
+            assert inbox.changed.wait_for(lambda: len(inbox.items) > 10, LIMIT_S)
+        publisher.close()
+        thread.join(LIMIT_S)
+        assert not thread.is_alive()
+        assert KEY in str(refused[0])
 
 
 def test_no_router_is_said_in_one_sentence(capfd: pytest.CaptureFixture[str]) -> None:

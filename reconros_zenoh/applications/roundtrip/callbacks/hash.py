@@ -10,11 +10,11 @@ if TYPE_CHECKING:
     from collections.abc import Generator
 
     import numpy as np
-    import simpy
     from numpy.typing import NDArray
 
     from reconros_zenoh.board.callback import HardwareThread, SoftwareContext
     from reconros_zenoh.board.endpoints import TopicWriter
+    from reconros_zenoh.clock.activity import Awaitable
     from reconros_zenoh.ros.types import MessageType
 
 
@@ -33,7 +33,7 @@ class Hash:
         """Publish the digest."""
         context.publish(self._publisher, self._answer(context.compute(sha256, source())))
 
-    def hardware(self, thread: HardwareThread) -> Generator[simpy.Event, object, None]:
+    def hardware(self, thread: HardwareThread) -> Generator[Awaitable, object, None]:
         """Publish the digest."""
         yield from thread.get_init_data()
         ram = yield from thread.mem_read(source())

@@ -12,10 +12,9 @@ from reconros_zenoh.errors import BadMessageError
 if TYPE_CHECKING:
     from collections.abc import Generator
 
-    import simpy
-
     from reconros_zenoh.board.callback import HardwareThread, SoftwareContext
     from reconros_zenoh.board.endpoints import TopicWriter
+    from reconros_zenoh.clock.activity import Awaitable
 
 
 class Inverse:
@@ -35,7 +34,7 @@ class Inverse:
         word = context.compute(inverse_kinematics, message.data)
         context.publish(self._publisher, self._publisher.message(data=word))
 
-    def hardware(self, thread: HardwareThread) -> Generator[simpy.Event, object, None]:
+    def hardware(self, thread: HardwareThread) -> Generator[Awaitable, object, None]:
         """Publish the servo index (Listing 3)."""
         message = yield from thread.get_init_data()
         ram = yield from thread.mem_read(np.array([message.data], np.uint32))

@@ -12,10 +12,9 @@ from reconros_zenoh.applications.roundtrip.kernels.mnist import SIDE, Classifier
 if TYPE_CHECKING:
     from collections.abc import Generator
 
-    import simpy
-
     from reconros_zenoh.board.callback import HardwareThread, SoftwareContext
     from reconros_zenoh.board.endpoints import TopicWriter
+    from reconros_zenoh.clock.activity import Awaitable
 
 
 class Mnist:
@@ -34,7 +33,7 @@ class Mnist:
         digit = context.compute(self._classify, message.data.reshape(SIDE, SIDE))
         context.publish(self._publisher, self._publisher.message(data=digit))
 
-    def hardware(self, thread: HardwareThread) -> Generator[simpy.Event, object, None]:
+    def hardware(self, thread: HardwareThread) -> Generator[Awaitable, object, None]:
         """Publish the digit."""
         message = yield from thread.get_init_data()
         ram = yield from thread.mem_read(message.data)

@@ -11,11 +11,11 @@ if TYPE_CHECKING:
     from collections.abc import Generator
 
     import numpy as np
-    import simpy
     from numpy.typing import NDArray
 
     from reconros_zenoh.board.callback import HardwareThread, SoftwareContext
     from reconros_zenoh.board.endpoints import TopicWriter
+    from reconros_zenoh.clock.activity import Awaitable
 
 HEIGHT, WIDTH, CHANNELS = SHAPE
 
@@ -35,7 +35,7 @@ class Sobel:
         edges = context.compute(sobel, message.data.reshape(SHAPE))
         context.publish(self._publisher, self._answer(message, edges))
 
-    def hardware(self, thread: HardwareThread) -> Generator[simpy.Event, object, None]:
+    def hardware(self, thread: HardwareThread) -> Generator[Awaitable, object, None]:
         """Publish the filtered image (Listing 2)."""
         message = yield from thread.get_init_data()
         ram = yield from thread.mem_read(message.data)

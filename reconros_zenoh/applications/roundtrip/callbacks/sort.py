@@ -11,9 +11,8 @@ from reconros_zenoh.errors import BadMessageError
 if TYPE_CHECKING:
     from collections.abc import Generator
 
-    import simpy
-
     from reconros_zenoh.board.callback import HardwareThread, SoftwareContext
+    from reconros_zenoh.clock.activity import Awaitable
     from reconros_zenoh.ros.types import MessageType
 
 
@@ -34,7 +33,7 @@ class Sort:
         """Return the response."""
         return self._response(sorted=context.compute(sort, request.unsorted))
 
-    def hardware(self, thread: HardwareThread) -> Generator[simpy.Event, object, Any]:
+    def hardware(self, thread: HardwareThread) -> Generator[Awaitable, object, Any]:
         """Return the response."""
         request = yield from thread.get_init_data()
         ram = yield from thread.mem_read(request.unsorted)

@@ -1,4 +1,4 @@
-"""Which liveliness tokens are alive, out of what a network reports of them."""
+"""What has changed, out of what a network reports of tokens and counterparts."""
 
 from __future__ import annotations
 
@@ -10,9 +10,28 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from reconros_zenoh.transport.base import Declaration
+    from reconros_zenoh.transport.base import Declaration, OnMatching
 
 _QUIET_S = 0.1
+
+
+class MatchingChanges:
+    """Passes on whether there is a counterpart: first the present state, then each change."""
+
+    def __init__(self, on_matching: OnMatching) -> None:
+        self._on_matching = on_matching
+        self._matched: bool | None = None
+
+    def start(self, matched: bool) -> None:
+        """Take the present state, unless a report came first: that is newer."""
+        if self._matched is None:
+            self.report(matched)
+
+    def report(self, matched: bool) -> None:
+        """Take a report that may be no news."""
+        if matched is not self._matched:
+            self._matched = matched
+            self._on_matching(matched)
 
 
 class TokenChanges:

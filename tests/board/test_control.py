@@ -1,0 +1,193 @@
+"""What a board tells about itself, and who may have its name."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import msgpack
+import pytest
+from small_board import Tickets, desktop, logging_thread, small_board, small_profile, types
+
+from reconros_zenoh.board.control import ControlServer, alive_key, ask_status, claim_name, status
+from reconros_zenoh.board.endpoints import SubscriptionSource
+from reconros_zenoh.board.executor import Executor
+from reconros_zenoh.clock.wall import WallEnvironment
+from reconros_zenoh.errors import BadMessageError, TransportError, UsageError
+from reconros_zenoh.executor.callbacks import CallbackKind
+from reconros_zenoh.transport.base import Reply
+from reconros_zenoh.transport.simulated import SimulatedNetwork
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from reconros_zenoh.board.board import Board
+
+PROFILE = small_profile({"a": (1_000_000, 2_000_000), "b": (1_000_000, 0)}, osif_ns=500_000)
+
+
+def board_that_ran() -> tuple[Board, Executor]:
+    """One with a callback that ran in slot 0, one that ran in software and failed once, and a spare slot."""
+    board = small_board(PROFILE, 2)
+    executor = Executor(board, 1, 1)
+    a, b = Tickets(board), Tickets(board)
+    executor.add_hw_callback("a", [0], CallbackKind.SUB, a, logging_thread([], "a"))
+    executor.add_sw_callback("b", CallbackKind.TMR, b, lambda message, _: 1 / message)
+    executor.spin()
+    for source, *tickets in ((a, 5, 5), (b, 1, 0)):
+        for ticket in tickets:
+            source.put(ticket)
+    board.environment.run(until=10_000_000)
+    return board, executor
+
+
+def test_the_status_of_a_board() -> None:
+    board, executor = board_that_ran()
+    assert status(board, executor) == {
+        "version": 1,
+        "board": "board0",
+        "profile": "small",
+        "domain": 0,
+        "executor": "reconros",
+        "callbacks": {
+            "a": {"kind": "SUB", "software": False, "slots": [0], "calls": 2, "failed": 0, "dropped": 0},
+            "b": {"kind": "TMR", "software": True, "slots": [], "calls": 2, "failed": 1, "dropped": 0},
+        },
+        "slots": [
+            {"id": 0, "holds": "a", "reconfigurations": 1, "reconfiguration_ms": 0.001, "busy_ms": 4.0},
+            {"id": 1, "holds": None, "reconfigurations": 0, "reconfiguration_ms": 0.0, "busy_ms": 0.0},
+        ],
+        "spans_ms": {},
+        "rejected": {},
+        "host": {"overruns": 0, "overrun_ms": 0.0, "lag_p50_us": None, "lag_p99_us": None},
+    }
+
+
+def test_the_status_counts_what_was_refused() -> None:
+    board = small_board(PROFILE)
+    word = types().message("std_msgs/msg/UInt32")
+    executor = Executor(board, 1, 0)
+
+    def refuse_nought(message: Any) -> None:
+        if message.data == 0:
+            raise BadMessageError("leg", "nought")
+
+    node = board.context.node("server")
+    source = SubscriptionSource(board, node, word, "in")
+    executor.add_sw_callback("a", CallbackKind.SUB, source, lambda _, __: None, refuse_nought)
+    executor.spin()
+    publisher = desktop(board).node("client").publisher(word, "in")
+    for number in (0, 1, 0):
+        publisher.publish(word.cls(data=number))
+    board.environment.run(until=10_000_000)
+    told = status(board, executor)
+    assert told["rejected"] == {"leg": 2}
+    assert told["callbacks"]["a"]["calls"] == 1
+
+
+def test_in_wall_time_the_status_says_how_late_the_event_loop_was() -> None:
+    environment = WallEnvironment()
+    board = small_board(PROFILE, environment=environment, threads=1)
+    environment.run(until=environment.timeout(1))
+    host = status(board, Executor(board, 1, 0))["host"]
+    board.close()
+    assert host["overruns"] == 0
+    assert host["lag_p50_us"] >= 0
+    assert host["lag_p99_us"] >= host["lag_p50_us"]
+
+
+def test_over_the_wire_the_status_is_msgpack() -> None:
+    board, executor = board_that_ran()
+    server = ControlServer(board, executor)
+    replies: list[Reply | None] = []
+    querier = desktop(board).transport.request("reconros/board0/status")
+    querier.get((b"",), None, replies.append, 10**9)
+    board.environment.run(until=board.environment.now + 1000)
+    reply, end = replies
+    assert end is None
+    assert reply is not None
+    assert reply.payload is not None
+    assert msgpack.unpackb(reply.payload) == status(board, executor)
+    server.close()
+    replies.clear()
+    querier.get((b"",), None, replies.append, 10**9)
+    board.environment.run(until=board.environment.now + 1000)
+    assert replies == [None], "a closed server does not answer"
+
+
+def test_a_name_can_be_claimed_until_a_board_has_it_and_again_when_it_has_gone() -> None:
+    board, executor = board_that_ran()
+    other = desktop(board).transport
+    claim_name(other, "board0")
+    server = ControlServer(board, executor)
+    with pytest.raises(
+        UsageError, match=r"'board0' is running already\. Stop it, or start this one with --name"
+    ):
+        claim_name(other, "board0")
+    claim_name(other, "board1")
+    claim_name(other, "board")
+    server.close()
+    claim_name(other, "board0")
+
+
+def test_the_token_of_a_board() -> None:
+    assert alive_key("left_arm") == "reconros/left_arm/alive"
+
+
+class Answering:
+    """A transport whose peer has answered already."""
+
+    def __init__(self, reply: Reply | None) -> None:
+        self._reply = reply
+        self.closed = False
+
+    def request(self, key: str, on_matching: Callable[[bool], None]) -> Answering:
+        assert key == "reconros/board0/status"
+        on_matching(True)
+        return self
+
+    def get(self, parts: Any, attachment: Any, on_reply: Callable[[Reply | None], None], _: int) -> None:
+        if self._reply is not None:
+            on_reply(self._reply)
+        on_reply(None)
+
+    def close(self) -> None:
+        self.closed = True
+
+
+def ask(reply: Reply | None) -> dict[str, Any]:
+    transport = Answering(reply)
+    try:
+        return ask_status(transport, "board0")  # type: ignore[arg-type] # all of a transport that it needs
+    finally:
+        assert transport.closed
+
+
+def packed(content: object) -> Reply:
+    return Reply(memoryview(msgpack.packb(content)), None, None)
+
+
+def test_the_status_of_a_board_that_answers() -> None:
+    assert ask(packed({"version": 1, "board": "board0"})) == {"version": 1, "board": "board0"}
+
+
+@pytest.mark.parametrize("reply", [None, Reply(None, None, "no")], ids=["silence", "error"])
+def test_a_board_that_does_not_answer(reply: Reply | None) -> None:
+    with pytest.raises(
+        TransportError, match=r"no board named 'board0' answers\..*reconros board --name board0"
+    ):
+        ask(reply)
+
+
+def test_a_board_of_another_version() -> None:
+    with pytest.raises(TransportError, match="'board0' speaks version 2 of the status, not 1"):
+        ask(packed({"version": 2}))
+
+
+def test_nobody_answers_in_an_empty_network() -> None:
+    """What `ask_status` builds on: a request without a server is over at once."""
+    board, _ = board_that_ran()
+    network = SimulatedNetwork(board.environment)
+    replies: list[Reply | None] = []
+    network.transport("a0").request("reconros/board0/status").get((b"",), None, replies.append, 10**9)
+    board.environment.run(until=board.environment.now + 1)
+    assert replies == [None]

@@ -1,0 +1,215 @@
+"""A callback that raises: counted and logged, the client of a service is told, and the board goes on."""
+
+from __future__ import annotations
+
+import logging
+from typing import TYPE_CHECKING, Any
+
+import pytest
+from small_board import Tickets, desktop, small_board, small_profile, types
+
+from reconros_zenoh.board.endpoints import ServiceSource, SubscriptionSource, TopicWriter
+from reconros_zenoh.board.executor import Executor
+from reconros_zenoh.errors import TransportError
+from reconros_zenoh.executor.callbacks import CallbackKind
+
+if TYPE_CHECKING:
+    from small_board import Steps
+
+    from reconros_zenoh.board.board import Board
+    from reconros_zenoh.board.callback import HardwareThread, SoftwareContext
+
+PROFILE = small_profile({"a": (100, 100)}, osif_ns=7)
+
+
+class NoughtError(Exception):
+    """What the callbacks here raise."""
+
+
+def one_failure(caplog: pytest.LogCaptureFixture, callback: str, error: type[Exception]) -> str:
+    """The text of the one record, which has the traceback."""
+    (record,) = caplog.records
+    assert record.levelno == logging.ERROR
+    assert record.getMessage() == f"callback {callback} failed"
+    assert record.exc_info is not None
+    assert record.exc_info[0] is error
+    assert record.exc_info[2] is not None
+    return str(record.exc_info[1])
+
+
+def software_board(board: Board) -> tuple[Executor, Tickets]:
+    """Fails for the message 0."""
+
+    def callback(message: int, _: SoftwareContext) -> float:
+        if message == 0:
+            raise NoughtError("nought")
+        return 1 / message
+
+    executor, source = Executor(board, 1, 0), Tickets(board)
+    executor.add_sw_callback("a", CallbackKind.SUB, source, callback)
+    executor.spin()
+    return executor, source
+
+
+def test_a_callback_in_software(caplog: pytest.LogCaptureFixture) -> None:
+    board = small_board(PROFILE)
+    executor, source = software_board(board)
+    source.put_at(0, 10)
+    board.environment.run(until=1000)
+    assert one_failure(caplog, "a", NoughtError) == "nought"
+    assert executor.calls == {"a": 2}
+    assert executor.failures == {"a": 1}
+    # The worker was busy for as long as the callback takes; then it took the next message.
+    assert source.answers == [(10, 0.1)]
+    assert [timeline.total_ns for timeline in source.timelines] == [100, 190]
+
+
+@pytest.mark.parametrize("when", ["before the computation", "in the kernel", "after it"])
+def test_a_callback_in_hardware(when: str, caplog: pytest.LogCaptureFixture) -> None:
+    def thread(thread: HardwareThread) -> Steps:
+        message = yield from thread.get_init_data()
+        if message:
+            return "well"
+        if when == "before the computation":
+            raise NoughtError(when)
+
+        def kernel() -> None:
+            if when == "in the kernel":
+                raise NoughtError(when)
+
+        yield from thread.compute(kernel)
+        raise NoughtError(when)
+
+    board = small_board(PROFILE, 1)
+    executor, source = Executor(board, 0, 1), Tickets(board)
+    executor.add_hw_callback("a", [0], CallbackKind.SUB, source, thread)
+    executor.spin()
+    source.put_at(0, 500)
+    board.environment.run(until=5000)
+    assert one_failure(caplog, "a", NoughtError) == when
+    assert executor.failures == {"a": 1}
+    assert source.answers == [(500, "well")]
+    # The slot is free again and still holds the bitstream.
+    slot = board.slots[0]
+    assert slot.reconfigurations == 1
+    assert slot.busy_ns == (14 if when == "before the computation" else 114)
+
+
+def test_every_failure_is_logged(caplog: pytest.LogCaptureFixture) -> None:
+    board = small_board(PROFILE)
+    executor, source = software_board(board)
+    for _ in range(3):
+        source.put(0)
+    board.environment.run(until=1000)
+    assert executor.failures == {"a": 3}
+    assert len(caplog.records) == 3
+
+
+def test_what_a_failed_callback_wanted_to_publish_is_not_published(caplog: pytest.LogCaptureFixture) -> None:
+    board = small_board(PROFILE)
+    word = types().message("std_msgs/msg/UInt32")
+    node = board.context.node("server")
+    writer = TopicWriter(board, node, word, "out")
+    got: list[int] = []
+    desktop(board).node("client").subscription(
+        word, "out", lambda received: got.append(received.message.data)
+    )
+
+    def callback(message: Any, context: SoftwareContext) -> None:
+        context.publish(writer, writer.message(data=message.data))
+        if message.data == 0:
+            raise NoughtError
+
+    executor = Executor(board, 1, 0)
+    source = SubscriptionSource(board, node, word, "in")
+    executor.add_sw_callback("a", CallbackKind.SUB, source, callback)
+    executor.spin()
+    publisher = desktop(board).node("other").publisher(word, "in")
+    for number in (0, 1):
+        publisher.publish(word.cls(data=number))
+    board.environment.run(until=1000)
+    assert got == [1]
+    assert board.spans._messages == {"a": 1}
+    one_failure(caplog, "a", NoughtError)
+
+
+def test_a_message_that_cannot_be_encoded_is_a_failure_of_its_callback(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    board = small_board(PROFILE)
+    writer = TopicWriter(board, board.context.node("server"), types().message("std_msgs/msg/UInt32"), "out")
+
+    def callback(_: object, context: SoftwareContext) -> None:
+        context.publish(writer, writer.message(data="seven"))
+
+    executor, source = Executor(board, 1, 0), Tickets(board)
+    executor.add_sw_callback("a", CallbackKind.SUB, source, callback)
+    executor.spin()
+    source.put("ticket")
+    board.environment.run(until=1000)
+    assert executor.failures == {"a": 1}
+    assert "std_msgs/msg/UInt32 cannot be serialised" in str(caplog.records[0].exc_info)
+
+
+class ServiceBoard:
+    """A service whose callback answers `yes`, raises, or returns what is no response."""
+
+    def __init__(self, *, in_hardware: bool) -> None:
+        self.board = small_board(PROFILE, 1)
+        self.type = types().service("std_srvs/srv/SetBool")
+        self.executor = Executor(self.board, 1, 1)
+        source = ServiceSource(self.board, self.board.context.node("server"), self.type, "ask")
+        self.returns: Any = None
+        if in_hardware:
+            self.executor.add_hw_callback("a", [0], CallbackKind.SRV, source, self._thread)
+        else:
+            self.executor.add_sw_callback("a", CallbackKind.SRV, source, self._function)
+        self.executor.spin()
+        self._client = desktop(self.board).node("client").client(self.type, "ask")
+        self.answers: list[Any] = []
+
+    def call(self, *, returns: object) -> object:
+        """Return what the client gets when the callback returns this, or raises it."""
+        self.returns = returns
+        self._client.call(self.type.request.cls(data=True), self.answers.append, 10**9)
+        before = len(self.answers)
+        self.board.environment.run(until=self.board.environment.now + 10_000)
+        assert len(self.answers) == before + 1, "one answer, long before the timeout"
+        return self.answers[-1]
+
+    def yes(self) -> object:
+        return self.type.response.cls(success=True, message="yes")
+
+    def _function(self, _: object, __: SoftwareContext) -> object:
+        if isinstance(self.returns, Exception):
+            raise self.returns
+        return self.returns
+
+    def _thread(self, _: HardwareThread) -> Steps:
+        yield from ()
+        return self._function(None, None)  # type: ignore[arg-type] # it uses neither
+
+
+@pytest.mark.parametrize("in_hardware", [True, False], ids=["hardware", "software"])
+def test_the_client_of_a_service_is_told(in_hardware: bool, caplog: pytest.LogCaptureFixture) -> None:
+    service = ServiceBoard(in_hardware=in_hardware)
+    answer = service.call(returns=NoughtError("no numbers"))
+    assert isinstance(answer, TransportError)
+    assert str(answer) == "service /ask refused: callback a failed: no numbers"
+    one_failure(caplog, "a", NoughtError)
+    assert service.call(returns=service.yes()) == service.yes()
+    assert service.executor.failures == {"a": 1}
+
+
+@pytest.mark.parametrize("in_hardware", [True, False], ids=["hardware", "software"])
+@pytest.mark.parametrize("returns", [None, "yes", 7])
+def test_a_service_callback_that_returns_no_response_has_failed(
+    in_hardware: bool, returns: object, caplog: pytest.LogCaptureFixture
+) -> None:
+    service = ServiceBoard(in_hardware=in_hardware)
+    answer = service.call(returns=returns)
+    assert isinstance(answer, TransportError)
+    assert "callback a failed: A message of type std_srvs/srv/SetBool_Response cannot be" in str(answer)
+    assert len(caplog.records) == 1
+    assert service.executor.failures == {"a": 1}
+    assert service.call(returns=service.yes()) == service.yes()

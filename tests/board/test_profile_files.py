@@ -1,0 +1,230 @@
+"""Board profiles: the shipped ones load, and every mistake in one is found in its line."""
+
+from __future__ import annotations
+
+from importlib import resources
+from typing import TYPE_CHECKING
+
+import pytest
+
+from reconros_zenoh.board.profile import Profile, profile_names, read_profile
+from reconros_zenoh.errors import FileError, UsageError
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+MINIITX = (resources.files("reconros_zenoh.board") / "profiles" / "miniitx-zynq7100.toml").read_text("utf-8")
+
+
+def test_two_profiles_ship() -> None:
+    assert profile_names() == ["miniitx-zynq7100", "native"]
+
+
+@pytest.mark.parametrize("name", profile_names())
+def test_a_shipped_profile_loads_by_its_name(name: str) -> None:
+    assert read_profile(name).name == name
+    assert read_profile(name).description
+
+
+def test_native_models_nothing() -> None:
+    assert read_profile("native").model is None
+
+
+def test_the_figures_that_the_paper_prints() -> None:
+    """ReconROS Executor, Sections V-A and V-B."""
+    model = read_profile("miniitx-zynq7100").model
+    assert model is not None
+    published = {
+        "cores": (model.cores.count, 2),
+        "core clock": (model.cores.clock, 666),
+        "infrastructure": (model.fabric.infrastructure_clock, 100),
+        "hardware threads": (model.fabric.thread_clock, 120),
+        "B": (model.icap.bandwidth, 160),
+        "t_offset": (model.icap.offset, 6.8),
+    }
+    assert {what: (quantity.value, quantity.basis) for what, (quantity, _) in published.items()} == {
+        what: (value, "published") for what, (_, value) in published.items()
+    }
+    assert {(slot.lut, slot.size.bytes, slot.size.basis) for slot in model.bitstreams} == {
+        (20800, 2838976, "published"),
+        (41600, 5285728, "published"),
+        (40800, 4883328, "published"),
+    }
+    assert list(model.callbacks) == ["sobel", "sort", "mnist", "inverse", "hash"]
+
+
+def test_the_reference_executor_polls_once_in_a_millisecond_and_in_ten() -> None:
+    model = read_profile("miniitx-zynq7100").model
+    assert model is not None
+    assert (model.executor.hardware_poll.ns, model.executor.software_poll.ns) == (1_040_000, 10_000_000)
+
+
+def test_a_slot_of_another_size_takes_the_bytes_per_lut_of_the_listed_ones() -> None:
+    profile = read_profile("miniitx-zynq7100")
+    assert profile.bitstream_size(20800, 160, 60) == 2838976
+    per_lut = (2838976 + 5285728 + 4883328) / (20800 + 41600 + 40800)
+    assert profile.bitstream_size(20800, 160, 61) == round(20800 * per_lut)
+    assert profile.bitstream_size(10000, 0, 0) == round(10000 * per_lut)
+    assert read_profile("native").bitstream_size(20800, 160, 60) == 4096
+
+
+def test_a_profile_of_ones_own(tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text(MINIITX.replace('name = "miniitx-zynq7100"', 'name = "mine"'))
+    assert read_profile(str(path)).name == "mine"
+    assert read_profile(str(path)).model == read_profile("miniitx-zynq7100").model
+
+
+def test_an_unknown_name_lists_those_there_are() -> None:
+    with pytest.raises(UsageError) as caught:
+        read_profile("zynq7000")
+    assert str(caught.value) == (
+        "no profile named 'zynq7000'. Give one of miniitx-zynq7100, native or a .toml file."
+    )
+
+
+def test_a_file_that_is_missing(tmp_path: Path) -> None:
+    with pytest.raises(FileError) as caught:
+        read_profile(str(tmp_path / "mine.toml"))
+    assert str(caught.value).startswith(f"{tmp_path / 'mine.toml'}: cannot be read")
+    assert "readable TOML file" in caught.value.remedy
+
+
+LAST_SIZE = 'size = { value = 4883328, unit = "B", basis = "published", source = "Table II, RS3" }'
+OSIF = '[model.osif]\ncall = { value = 10, unit = "us", basis = "assumed" }\n'
+
+# What is replaced by what, the text of the line that must be named, and what must be said.
+MISTAKES = {
+    "not TOML": ("count = {", "count = = {", "count = = {", "is not TOML"),
+    "not closed": ('name = "miniitx-zynq7100"', 'name = "miniitx', 'name = "miniitx', "is not TOML"),
+    "section missing": (OSIF, "", None, "model.osif: Field required"),
+    "name missing": ('name = "miniitx-zynq7100"\n', "", None, "name: Field required"),
+    "key missing": (
+        'call = { value = 10, unit = "us", basis = "assumed" }',
+        "",
+        "[model.osif]",
+        "model.osif.call",
+    ),
+    "negative": (
+        "hardware_poll = { value = 1.04",
+        "hardware_poll = { value = -1.04",
+        "hardware_poll =",
+        "model.executor.hardware_poll.value: Input should be greater than or equal to 0",
+    ),
+    "no bandwidth": (
+        "bandwidth = { value = 160",
+        "bandwidth = { value = 0",
+        "bandwidth = { value = 0",
+        "model.icap.bandwidth.value: Input should be greater than 0",
+    ),
+    "not a number": ("value = 666", 'value = "fast"', "clock = { value", "model.cores.clock.value"),
+    "no core": (
+        "count = { value = 2",
+        "count = { value = 0",
+        "count = {",
+        "model.cores.count.value: Input should be greater than or equal to 1",
+    ),
+    "half a core": ("count = { value = 2", "count = { value = 1.5", "count = {", "model.cores.count.value"),
+    "more than all": ("value = 0.13", "value = 1.3", "nack_probability =", "less than or equal to 1"),
+    "unknown unit": (
+        'value = 666, unit = "MHz"',
+        'value = 666, unit = "rpm"',
+        "clock = { value = 666",
+        "model.cores.clock: Value error, unknown unit 'rpm': write one of Hz, kHz, MHz, GHz",
+    ),
+    "unit missing": (
+        'value = 666, unit = "MHz"',
+        "value = 666",
+        "clock = {",
+        "model.cores.clock.unit: Field required",
+    ),
+    "unknown basis": (
+        'per_byte = { value = 8.5, unit = "ns/B", basis = "calibrated"',
+        'per_byte = { value = 8.5, unit = "ns/B", basis = "guessed"',
+        "per_byte = { value = 8.5",
+        "model.link.per_byte.basis: Input should be 'published', 'calibrated' or 'assumed'",
+    ),
+    "unknown key": (
+        "stalled_by_reconfiguration = true",
+        "stalled_by_reconfiguration = true\ncolour = 3",
+        "colour = 3",
+        "model.dds.colour: Extra inputs are not permitted",
+    ),
+    "unknown section": (OSIF, OSIF + "[model.gpu]\ncores = 1\n", "[model.gpu]", "model.gpu: Extra inputs"),
+    "unknown key of a quantity": (
+        'call = { value = 10, unit = "us"',
+        'call = { value = 10, units = "us", unit = "us"',
+        "call = {",
+        "model.osif.call.units: Extra inputs",
+    ),
+    "unknown key of the file": (
+        'description = "',
+        'colour = "red"\ndescription = "',
+        'colour = "red"',
+        "colour: Extra inputs",
+    ),
+    "not a quantity": (
+        'call = { value = 10, unit = "us", basis = "assumed" }',
+        "call = 10",
+        "call = 10",
+        "model.osif.call",
+    ),
+    "a number for a yes or no": (
+        "stalled_by_reconfiguration = true",
+        "stalled_by_reconfiguration = 7",
+        "stalled_by_reconfiguration = 7",
+        "model.dds.stalled_by_reconfiguration: Input should be a valid boolean",
+    ),
+    "a callback's time": (
+        "compute = { value = 65.428",
+        "compute = { value = -65.428",
+        "compute = { value = -65.428",
+        "model.callbacks.hash.compute.value",
+    ),
+    "a callback without software": (
+        'software = { value = 1.5, unit = "ms", basis = "published", source = "Table I" }\n',
+        "",
+        "[model.callbacks.inverse]",
+        "model.callbacks.inverse.software: Field required",
+    ),
+    "the third bitstream": (
+        LAST_SIZE,
+        LAST_SIZE.replace('"B"', '"Byte"'),
+        'size = { value = 4883328, unit = "Byte"',
+        "model.bitstreams.2.size: Value error, unknown unit 'Byte'",
+    ),
+    "the third bitstream's resources": ("lut = 40800", "lut = -1", "lut = -1", "model.bitstreams.2.lut"),
+    "a slot without LUTs": ("lut = 40800", "lut = 0", "lut = 0", "model.bitstreams.2.lut"),
+}
+
+
+@pytest.mark.parametrize(("old", "new", "place", "said"), MISTAKES.values(), ids=MISTAKES)
+def test_a_mistake_is_found_in_its_line(
+    tmp_path: Path, old: str, new: str, place: str | None, said: str
+) -> None:
+    assert MINIITX.count(old) == 1
+    path = tmp_path / "mine.toml"
+    path.write_text(MINIITX.replace(old, new))
+    with pytest.raises(FileError) as caught:
+        read_profile(str(path))
+    error = caught.value
+    assert error.path == path
+    assert said in error.problem
+    assert error.remedy
+    lines = path.read_text().splitlines()
+    assert (None if error.line is None else lines[error.line - 1][: len(place or "")]) == place
+
+
+def test_without_any_bitstream_size_a_model_is_of_no_use(tmp_path: Path) -> None:
+    head, rest = MINIITX.split("# Table II;")
+    path = tmp_path / "mine.toml"
+    path.write_text(head + "[model.callbacks" + rest.split("[model.callbacks", 1)[1])
+    with pytest.raises(FileError, match=r"model\.bitstreams: Field required"):
+        read_profile(str(path))
+
+
+def test_a_profile_cannot_be_changed() -> None:
+    profile = read_profile("native")
+    with pytest.raises(ValueError, match="frozen"):
+        profile.name = "other"
+    assert isinstance(profile, Profile)

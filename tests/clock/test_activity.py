@@ -1,0 +1,155 @@
+"""Activities and signals: processes that go on at once, without an event in between."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import pytest
+
+from reconros_zenoh.clock.activity import Activity, Signal
+from reconros_zenoh.clock.virtual import VirtualEnvironment
+
+if TYPE_CHECKING:
+    from collections.abc import Generator
+
+    import simpy
+
+    from reconros_zenoh.clock.activity import Awaitable
+
+
+def test_an_activity_begins_when_it_is_made_and_goes_on_when_it_is_resumed_both_without_an_event() -> None:
+    log: list[str] = []
+
+    def work() -> Generator[simpy.Event | None, object, None]:
+        for name in "abc":
+            log.append(name)
+            yield None
+
+    activity = Activity(work())
+    assert log == ["a"]
+    assert activity.parked
+    activity.resume()
+    assert log == ["a", "b"]
+
+
+def test_an_activity_waits_for_an_event_and_gets_its_value() -> None:
+    environment = VirtualEnvironment()
+    log: list[object] = []
+
+    def work() -> Generator[simpy.Event | None, object, None]:
+        value = yield environment.timeout(5, "value")
+        log.append((environment.now, value))
+
+    activity = Activity(work())
+    assert not activity.parked
+    environment.run()
+    assert log == [(5, "value")]
+
+
+def test_an_event_that_has_happened_is_not_waited_for() -> None:
+    environment = VirtualEnvironment()
+    happened = environment.timeout(1, "value")
+    environment.run()
+    log: list[object] = []
+
+    def work() -> Generator[simpy.Event | None, object, None]:
+        log.append((yield happened))
+
+    Activity(work())
+    assert log == ["value"]
+
+
+def test_resuming_an_activity_that_waits_for_an_event_or_has_ended_does_nothing() -> None:
+    environment = VirtualEnvironment()
+    log: list[int] = []
+
+    def work() -> Generator[simpy.Event | None, object, None]:
+        yield environment.timeout(5)
+        log.append(environment.now)
+
+    activity = Activity(work())
+    activity.resume()
+    assert log == []
+    environment.run()
+    activity.resume()
+    environment.run()
+    assert log == [5]
+
+
+@pytest.mark.parametrize("late", [False, True])
+def test_an_event_that_fails_raises_in_the_activity_which_may_go_on(late: bool) -> None:
+    environment = VirtualEnvironment()
+    event = environment.event()
+    log: list[object] = []
+
+    def work() -> Generator[simpy.Event | None, object, None]:
+        if late:
+            yield environment.timeout(2)
+        try:
+            yield event
+        except ValueError as error:
+            log.append(str(error))
+        yield environment.timeout(10)
+        log.append(environment.now)
+
+    Activity(work())
+    event.fail(ValueError("reason"))
+    if late:
+        event.defused = True  # nobody waits for it yet: SimPy would end the run
+    environment.run()
+    assert log == ["reason", 12 if late else 10]
+
+
+def test_what_an_activity_raises_reaches_who_made_it_go_on() -> None:
+    def work() -> Generator[simpy.Event | None, object, None]:
+        yield None
+        raise ValueError("reason")
+
+    activity = Activity(work())
+    with pytest.raises(ValueError, match="reason"):
+        activity.resume()
+
+
+def test_who_waits_for_a_signal_goes_on_while_it_is_fired_in_the_order_of_waiting() -> None:
+    signal = Signal()
+    log: list[object] = []
+
+    def work(name: str) -> Generator[Awaitable | None, object, None]:
+        log.append((name, (yield signal)))
+
+    first, _ = Activity(work("first")), Activity(work("second"))
+    first.resume()
+    assert log == []
+    signal.fire()
+    assert log == [("first", None), ("second", None)]
+
+
+def test_a_signal_happens_once_and_is_not_waited_for_any_more() -> None:
+    signal = Signal()
+    log: list[str] = []
+
+    def work() -> Generator[Awaitable | None, object, None]:
+        yield signal
+        log.append("first")
+        yield signal
+        log.append("second")
+
+    Activity(work())
+    signal.fire()
+    signal.fire()
+    assert log == ["first", "second"]
+
+
+def test_ten_thousand_events_that_have_happened_are_no_recursion() -> None:
+    environment = VirtualEnvironment()
+    happened = environment.timeout(0)
+    environment.run()
+    log: list[int] = []
+
+    def work() -> Generator[simpy.Event | None, object, None]:
+        for number in range(10_000):
+            yield happened
+            log.append(number)
+
+    Activity(work())
+    assert len(log) == 10_000

@@ -1,0 +1,43 @@
+"""`reconros client`, also as `python -m host_clients`."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING
+
+import pytest
+from processes import RECONROS, run
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from conftest import Network
+
+
+@pytest.mark.parametrize(
+    "program", [(*RECONROS, "client"), ("-m", "host_clients")], ids=["reconros", "host_clients"]
+)
+def test_a_client_records_and_prints_its_round_trips(
+    network: Network, tmp_path: Path, program: tuple[str, ...]
+) -> None:
+    record = tmp_path / "new folder" / "sort.csv"
+    done = run(
+        *("sort", "--requests=3", "--router", network.endpoint, "--out", record, "--json"), program=program
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    summary = json.loads(done.stdout)
+    assert {name: summary[name] for name in ("client", "requests", "n", "lost", "wrong")} == {
+        "client": "sort",
+        "requests": 3,
+        "n": 3,
+        "lost": 0,
+        "wrong": 0,
+    }
+    lines = [line.split(",") for line in record.read_text(encoding="ascii").splitlines()]
+    assert [(index, outcome) for index, _, outcome in lines] == [
+        ("index", "outcome"),
+        ("0", "ok"),
+        ("1", "ok"),
+        ("2", "ok"),
+    ]
+    assert sorted(float(time) for _, time, _ in lines[1:])[1] == pytest.approx(summary["median_ms"])
