@@ -61,7 +61,8 @@ class Board:
         self.memif = Memif(environment, model.memif.bandwidth.bytes_per_ns if model else None)
         self.osif = Osif(self.cpu, model.osif.call.ns if model else 0)
         self.zycap = ZyCAP(environment, self.cpu, model.icap if model else None, model.dds if model else None)
-        self.dds = DdsStack(environment, self.cpu, model, random.Random(f"{seed} {name}"))
+        self.randomness = random.Random(f"{seed} {name}")
+        self.dds = DdsStack(environment, self.cpu, model, self.randomness)
         self.host = Host(environment, threads)
         self.spans = Spans()
         self.slots: Mapping[int, ReconfigurableSlot] = {

@@ -27,9 +27,9 @@ class Cpu:
         """Return when a thread has had `core_time_ns` on the cores."""
         return self._cores.serve(core_time_ns)
 
-    def run_stack(self, core_time_ns: float) -> Generator[Awaitable, object, None]:
-        """Return when the communication stack has had `core_time_ns` on the cores."""
-        return self._cores.serve(core_time_ns, first=True)
+    def run_stack(self, core_time_ns: float, share: float) -> Generator[Awaitable, object, None]:
+        """Return when the stack has had `core_time_ns`, of one core at most `share` at a time."""
+        return self._cores.serve(core_time_ns, share, first=True)
 
     def stall_stack(self) -> None:
         """Keep the communication stack from running until `resume_stack`."""

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
+
+from reconros_zenoh.board.stream import Stream
+from reconros_zenoh.clock.activity import Signal
 
 if TYPE_CHECKING:
     import random
@@ -14,9 +17,27 @@ if TYPE_CHECKING:
     from reconros_zenoh.clock.activity import Awaitable
     from reconros_zenoh.clock.virtual import VirtualEnvironment
 
+# More than any board has under way at once: the queues of readers and writers are the ones that overflow.
+_BACKLOG = 1_000_000
+
+
+class _Passage(NamedTuple):
+    """A message's turn in the stack: how long it takes when cores are free, and who waits for its end."""
+
+    duration_ns: float
+    done: Signal
+
 
 class DdsStack:
     """The link of the board and the communication stack on its cores; free where nothing is modelled.
+
+    The stack serves one message at a time, in the order in which they come, whatever their node and
+    direction: a small message that comes behind a large one waits for it. On the real board that is what
+    delays a small round trip by most of a Sobel image's way in and out (reference data, DESIGN.md).
+
+    The fragments of a large message go over the link while the stack works on those before them. A large
+    message may lose a fragment: then it is resent whole after `nack_delay`, or, when the request for it is
+    lost too, after the next heartbeat of its writer.
 
     The link is charged here rather than in the transport, so that the same model holds in both clocks. In
     wall time a message has spent some of the modelled link time in the real network already: its source
@@ -30,6 +51,7 @@ class DdsStack:
         self._cpu = cpu
         self._randomness = randomness
         self._modelled = model is not None
+        self._passages: Stream[_Passage] = Stream(self._pass, _BACKLOG)
         if model is not None:
             dds, link = model.dds, model.link
             self._latency_ns = link.latency.ns
@@ -38,42 +60,69 @@ class DdsStack:
             self._ns_per_byte = dds.per_byte.ns_per_byte
             self._ns_per_byte_large = dds.per_byte_large.ns_per_byte
             self._large_from = dds.large_from.bytes
+            self._core_share = dds.core_share.share
+            self._jitter = dds.jitter.share
             self._nack_probability = dds.nack_probability.share
             self._nack_delay_ns = dds.nack_delay.ns
+            self._loss_probability = dds.loss_probability.share
+            self._heartbeat_ns = dds.heartbeat_period.ns
 
     def receive(self, size: int, transit_ns: int, timeline: Timeline) -> Generator[Awaitable, object, None]:
         """Return when a message of `size` bytes that left `transit_ns` ago has come through the stack."""
         if not self._modelled:
             timeline.mark("transport")
             return
-        yield from self._cross_link(size, transit_ns)
+        left_ns = self._environment.now - max(0, transit_ns)
+        yield from self._until(left_ns + self._link_ns(min(size, self._large_from)))
         timeline.mark("transport")
         yield from self._process(size)
+        yield from self._until(left_ns + self._link_ns(size))
         timeline.mark("dds")
-        yield from self._retransmit(size, timeline)
+        yield from self._repair(size, timeline)
 
     def send(self, size: int, timeline: Timeline) -> Generator[Awaitable, object, None]:
         """Return when a message of `size` bytes has gone through the stack and over the link."""
         if not self._modelled:
             timeline.mark("dds")
             return
+        began_ns = self._environment.now
         yield from self._process(size)
         timeline.mark("dds")
-        yield from self._retransmit(size, timeline)
-        yield from self._cross_link(size, 0)
+        yield from self._repair(size, timeline)
+        last_fragment_ns = self._environment.now + self._link_ns(min(size, self._large_from))
+        yield from self._until(max(last_fragment_ns, began_ns + self._link_ns(size)))
         timeline.mark("transport")
 
-    def _cross_link(self, size: int, transit_ns: int) -> Generator[Awaitable, object, None]:
-        left_ns = self._latency_ns + round(size * self._link_ns_per_byte) - max(0, transit_ns)
-        if left_ns > 0:
-            yield self._environment.timeout(left_ns)
+    def _link_ns(self, size: int) -> int:
+        return self._latency_ns + round(size * self._link_ns_per_byte)
+
+    def _until(self, time_ns: int) -> Generator[Awaitable, object, None]:
+        if time_ns > self._environment.now:
+            yield self._environment.timeout(time_ns - self._environment.now)
 
     def _process(self, size: int) -> Generator[Awaitable, object, None]:
+        """Return when the stack has worked on a message of `size` bytes."""
         ns_per_byte = self._ns_per_byte_large if size > self._large_from else self._ns_per_byte
-        return self._cpu.run_stack(self._message_ns + size * ns_per_byte)
+        duration_ns = self._message_ns + size * ns_per_byte
+        if self._jitter:
+            duration_ns *= self._randomness.lognormvariate(0, self._jitter)
+        passage = _Passage(duration_ns, Signal())
+        self._passages.put(passage)
+        if passage.done.callbacks is not None:
+            yield passage.done
 
-    def _retransmit(self, size: int, timeline: Timeline) -> Generator[Awaitable, object, None]:
-        while size > self._large_from and self._randomness.random() < self._nack_probability:
-            yield self._environment.timeout(self._nack_delay_ns + round(size * self._link_ns_per_byte))
+    def _pass(self, passage: _Passage) -> Generator[Awaitable, object, None]:
+        yield from self._cpu.run_stack(passage.duration_ns * self._core_share, self._core_share)
+        passage.done.fire()
+
+    def _repair(self, size: int, timeline: Timeline) -> Generator[Awaitable, object, None]:
+        """Return when no fragment of a large message is missing any more."""
+        if size <= self._large_from:
+            return
+        if self._randomness.random() < self._loss_probability:
+            yield self._environment.timeout(round(self._randomness.uniform(0, self._heartbeat_ns)))
+            timeline.mark("retransmission")
+        while self._randomness.random() < self._nack_probability:
+            yield self._environment.timeout(self._nack_delay_ns)
             yield from self._process(size)
             timeline.mark("retransmission")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 from collections import Counter
 from dataclasses import dataclass, field
 from functools import partial
@@ -72,6 +73,8 @@ class Executor:
         self._policy = StandardExecutor() if kind == "standard" else ReconrosExecutor()
         self._registrations: dict[str, _Registration] = {}
         self._workers_of: dict[str, list[Worker]] = {}
+        model = board.profile.model
+        self._poll_jitter = model.executor.poll_jitter.share if model else 0.0
         self.calls: Counter[str] = Counter()
         self.failures: Counter[str] = Counter()
 
@@ -174,6 +177,13 @@ class Executor:
             }
             for name, registration in self._registrations.items()
         }
+
+    def until_poll_ns(self, poll_ns: int, idle_ns: int) -> int:
+        """Return how long [ns] until a worker that polls and has been idle for `idle_ns` looks next."""
+        if not poll_ns:
+            return 0
+        drift_ns = poll_ns * self._poll_jitter * math.sqrt(idle_ns / poll_ns)
+        return round(-(idle_ns + self.board.randomness.gauss(0, drift_ns)) % poll_ns)
 
     @property
     def dispatch_ns(self) -> int:

@@ -8,7 +8,16 @@ from typing import TYPE_CHECKING, Annotated
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from reconros_zenoh.board.quantity import Bandwidth, CostPerByte, Count, Duration, Fraction, Frequency, Size
+from reconros_zenoh.board.quantity import (
+    Bandwidth,
+    CostPerByte,
+    Count,
+    Duration,
+    Fraction,
+    Frequency,
+    Share,
+    Size,
+)
 from reconros_zenoh.errors import FileError, UsageError
 from reconros_zenoh.toml_file import TomlFile
 
@@ -41,28 +50,39 @@ class FabricSection(_Section):
 class ExecutorSection(_Section):
     """What the reference implementation of the executor costs.
 
-    An idle worker looks for work once per poll period. `dispatch` is processor time per callback: taking the
-    message and starting the function or the slot.
+    An idle worker looks for work once per poll period, whose length varies by `poll_jitter` (relative
+    standard deviation). `dispatch` is processor time per callback: taking the message and starting the
+    function or the slot.
     """
 
     hardware_poll: Duration
     software_poll: Duration
+    poll_jitter: Fraction
     dispatch: Duration
 
 
 class DdsSection(_Section):
-    """The ROS 2 communication stack on the cores, per message and direction.
+    """The ROS 2 communication stack, per message and direction.
 
-    A message of more than `large_from` costs `per_byte_large`. A large message is resent whole with
-    probability `nack_probability`, `nack_delay` after its first copy.
+    A message takes `per_message` and its bytes; one of more than `large_from` goes in fragments of that size
+    and takes `per_byte_large`. Meanwhile the stack keeps one core busy for `core_share` of the time. Times
+    vary by `jitter` (standard deviation of their logarithm). A large message is resent whole with probability
+    `nack_probability`, `nack_delay` after its first copy; with `loss_probability` it waits for the next
+    heartbeat of its writer, one per `heartbeat_period`. `recovery` is how long the stack needs to go on after
+    a reconfiguration stalled it.
     """
 
     per_message: Duration
     per_byte: CostPerByte
     per_byte_large: CostPerByte
     large_from: Size
+    core_share: Share
+    jitter: Fraction
     nack_probability: Fraction
     nack_delay: Duration
+    loss_probability: Fraction
+    heartbeat_period: Duration
+    recovery: Duration
     stalled_by_reconfiguration: bool
 
 
@@ -74,11 +94,10 @@ class LinkSection(_Section):
 
 
 class IcapSection(_Section):
-    """The configuration port: `t_rc = S / bandwidth + offset`, then `settle` until the slot's thread runs."""
+    """The configuration port: `t_rc = S / bandwidth + offset`."""
 
     bandwidth: Bandwidth
     offset: Duration
-    settle: Duration
 
 
 class MemifSection(_Section):

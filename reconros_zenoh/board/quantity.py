@@ -102,6 +102,12 @@ class Fraction(Quantity):
         return self._scaled
 
 
+class Share(Fraction):
+    """A share of more than nothing."""
+
+    value: Annotated[float, Field(gt=0, le=1, allow_inf_nan=False)]
+
+
 class Count(Quantity):
     """A whole number of things."""
 

@@ -16,18 +16,24 @@ if TYPE_CHECKING:
 class _Job(Signal):
     """Work that is being done; fires when it is done.
 
-    `remaining` is what was left at `since_ns`; `due_ns` is when nothing will be, None while it waits.
+    `remaining` is what was left at `since_ns`; `due_ns` is when nothing will be, None while it waits. `limit`
+    is the highest rate that it can use.
     """
 
-    __slots__ = ("due_ns", "first", "rate", "remaining", "since_ns")
+    __slots__ = ("due_ns", "first", "limit", "rate", "remaining", "since_ns")
 
-    def __init__(self, work: float, now_ns: int, *, first: bool) -> None:
+    def __init__(self, work: float, now_ns: int, limit: float, *, first: bool) -> None:
         super().__init__()
         self.remaining = work
         self.since_ns = now_ns
+        self.limit = limit
         self.first = first
         self.rate = 0.0
         self.due_ns: int | None = None
+
+
+def _limit(job: _Job) -> float:
+    return job.limit
 
 
 class SharedResource:
@@ -45,11 +51,16 @@ class SharedResource:
         self._jobs: list[_Job] = []
         self._holds = 0
 
-    def serve(self, work: float, *, first: bool = False) -> Generator[Signal, object, None]:
-        """Return when `work` units have been done for the caller; at once when there is none."""
+    def serve(
+        self, work: float, limit: float | None = None, *, first: bool = False
+    ) -> Generator[Signal, object, None]:
+        """Return when `work` units have been done for the caller; at once when there is none.
+
+        `limit` is the most that the job can use at a time, if that is less than `per_job`.
+        """
         if work <= 0:
             return
-        job = _Job(work, self._environment.now, first=first)
+        job = _Job(work, self._environment.now, self._per_job if limit is None else limit, first=first)
         self._jobs.append(job)
         self._share()
         yield job
@@ -66,15 +77,16 @@ class SharedResource:
 
     def _share(self) -> None:
         """Give every job its rate, and a new completion where that changes."""
-        first = sum(job.first for job in self._jobs)
-        others = len(self._jobs) - first
-        rate_first = 0.0 if self._holds or not first else min(self._per_job, self._capacity / first)
-        left = self._capacity - rate_first * first
-        rate_others = min(self._per_job, left / others) if others else 0.0
-        for job in self._jobs:
-            rate = rate_first if job.first else rate_others
-            if rate != job.rate:
-                self._plan(job, rate)
+        left = self._capacity
+        for group in ([job for job in self._jobs if job.first], [job for job in self._jobs if not job.first]):
+            # Whoever can use less than an equal share leaves the rest to the others.
+            for place, job in enumerate(sorted(group, key=_limit)):
+                rate = min(job.limit, left / (len(group) - place))
+                if job.first and self._holds:
+                    rate = 0.0
+                left -= rate
+                if rate != job.rate:
+                    self._plan(job, rate)
 
     def _plan(self, job: _Job, rate: float) -> None:
         now_ns = self._environment.now

@@ -23,8 +23,8 @@ class ZyCAP:
     """The three functions of the ReconROS library: `init`, `write_bitstream`, `deinit`.
 
     A write takes `t_rc = S / B + t_offset` and, where the profile says so, keeps the communication stack off
-    the cores meanwhile; then the slot settles. There is one ICAP: writes queue for it. `icap` is None where
-    nothing is modelled.
+    the cores meanwhile and until it has recovered. There is one ICAP: writes queue for it. `icap` is None
+    where nothing is modelled.
     """
 
     def __init__(
@@ -33,7 +33,7 @@ class ZyCAP:
         self._environment = environment
         self._cpu = cpu
         self._icap = icap
-        self._stalls = dds is not None and dds.stalled_by_reconfiguration
+        self._recovery_ns = dds.recovery.ns if dds is not None and dds.stalled_by_reconfiguration else None
         self._port = simpy.Resource(environment, capacity=1)
         self._prefetched: Mapping[tuple[int, str], Bitstream] = {}
 
@@ -70,13 +70,11 @@ class ZyCAP:
             slot.holds = None
             duration_ns = self.reconfiguration_ns(bitstream.size)
             if duration_ns:
-                if self._stalls:
+                if self._recovery_ns is not None:
                     self._cpu.stall_stack()
                 yield self._environment.timeout(duration_ns)
-                if self._stalls:
-                    self._cpu.resume_stack()
-            if self._icap is not None:
-                yield self._environment.timeout(self._icap.settle.ns)
+                if self._recovery_ns is not None:
+                    self._environment.call_later(self._recovery_ns, self._cpu.resume_stack)
         slot.holds = bitstream
         slot.reconfigurations += 1
         slot.reconfiguration_ns += self._environment.now - started_ns

@@ -42,9 +42,12 @@ def router(
     ] = _ENDPOINT,
 ) -> None:
     """Run a Zenoh router until Ctrl-C; any rmw_zenoh router serves as well."""
+    endings = {signal.SIGINT, signal.SIGTERM}
+    # `sigwait` only takes signals that are blocked, in Zenoh's threads too.
+    signal.pthread_sigmask(signal.SIG_BLOCK, endings)
     with ZenohRouter.open(listen):
         print(f"router listens on {listen}", flush=True)
-        signal.sigwait({signal.SIGINT, signal.SIGTERM})
+        signal.sigwait(endings)
 
 
 def board(

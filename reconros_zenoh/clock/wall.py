@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
 _SPIN_NS = 100_000
 _TURN_NS = 1_000_000
+# A signal that comes just as the sleep begins is served when it ends.
+_NAP_NS = 1_000_000_000
 _PR_SET_TIMERSLACK = 29
 _LAGS_KEPT = 1 << 16
 _OBJECTS_BETWEEN_COLLECTIONS = 50_000
@@ -82,7 +84,10 @@ class WallEnvironment(VirtualEnvironment):
                 return
 
     def run(self, until: simpy.Event) -> Any:  # type: ignore[override] # only until an event
-        """Keep the loop going until the event has happened and return its value, or raise its error."""
+        """Keep the loop going until the event has happened and return its value, or raise its error.
+
+        What else is due in the same turn still happens.
+        """
         if until.callbacks is not None:
             # It may happen in another thread's turn.
             until.callbacks.append(lambda _: self._alarm.put(None))
@@ -117,7 +122,7 @@ class WallEnvironment(VirtualEnvironment):
         """
         while True:
             due = self.peek()
-            if self._inbox and self._inbox[0][0] <= due:
+            if self._inbox and self._inbox[0][0] <= due and time.monotonic_ns() <= deadline_ns:
                 posted_ns, function, arguments = self._inbox.popleft()
                 self._now = max(self._now, posted_ns)
                 function(*arguments)
@@ -144,8 +149,7 @@ class WallEnvironment(VirtualEnvironment):
             if self._failure is not None or self.peek() < until_ns:
                 return
             try:
-                # Without an event ahead only an alarm can end the sleep.
-                self._alarm.get(timeout=None if early_ns == float("inf") else (early_ns - _SPIN_NS) / 1e9)
+                self._alarm.get(timeout=min(early_ns - _SPIN_NS, _NAP_NS) / 1e9)
             except Empty:
                 continue
             return

@@ -17,7 +17,7 @@ class OffsetVector:
 
     A search starts behind `Position`. When it meets the end of the list, `Position` wraps to the beginning
     and the worker goes on to the next list, so a subscriber that is always ready cannot starve the service
-    servers behind it: between two services of it every other list is looked at once.
+    servers behind it.
     """
 
     def __init__(self, lists: CallbackLists) -> None:

@@ -45,7 +45,7 @@ class StandardExecutor:
 
     def _from_ready_set(self, resource: int) -> Dispatch | None:
         for kind in _COLLECTED:
-            # A collected callback may run already on another worker: it is served in the next readySet.
+            # What was collected may have gone meanwhile: pushed out by a newer event.
             serviceable = self._ready_set[kind] & self.callbacks[kind].ready(resource)
             if serviceable:
                 index = lowest(serviceable)

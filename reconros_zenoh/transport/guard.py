@@ -40,43 +40,42 @@ class GuardedDeclaration:
     A subclass calls them through `call` and says in `withdraw` how it leaves the network.
     """
 
-    __slots__ = ("_closed", "_failed", "_key", "_lock")
+    __slots__ = ("_has_failed", "_key", "is_closed", "lock")
 
     def __init__(self, key: str) -> None:
         self._key = key
-        self._closed = False
-        self._failed = False
-        self._lock = RLock()  # a callback may close its own declaration
+        self._has_failed = False
+        self.is_closed = False
+        self.lock = RLock()  # a callback may close its own declaration
 
     def call(self, callback: Callable[[Unpack[_Arguments]], None], *arguments: *_Arguments) -> None:
         """Run `callback` unless this is closed; its first exception is logged, none leaves this method."""
-        with self._lock:
-            if self._closed:
-                return
-            try:
-                callback(*arguments)
-            except Exception:  # noqa: BLE001 # whatever a callback raises, the transport goes on
-                if not self._failed:
-                    self._failed = True
-                    _log.exception("a callback for %s failed; it is not reported again", self._key)
+        with self.lock:
+            if not self.is_closed:
+                try:
+                    callback(*arguments)
+                except Exception:  # noqa: BLE001 # whatever a callback raises, the transport goes on
+                    self.log_failure()
+
+    def log_failure(self) -> None:
+        """Log the exception being handled, if it is the first."""
+        if not self._has_failed:
+            self._has_failed = True
+            _log.exception("a callback for %s failed; it is not reported again", self._key)
 
     def check_open(self) -> None:
         """Raise TransportError when this is closed."""
-        if self._closed:
+        if self.is_closed:
             raise TransportError(f"{self._key} is closed: nothing can be sent on it any more")
 
     def close(self) -> None:
-        """Leave the network. Idempotent."""
-        if self.shut():
-            self.withdraw()
-
-    def shut(self) -> bool:
-        """Stop the callbacks and wait for one that runs on another thread; False if they were stopped."""
-        with self._lock:
-            was_open = not self._closed
-            self._closed = True
-        return was_open
+        """Leave the network; waits for a callback that runs on another thread. Idempotent."""
+        with self.lock:
+            if self.is_closed:
+                return
+            self.is_closed = True
+        self.withdraw()
 
     def withdraw(self) -> None:
-        """Leave the network; called once, after `shut`."""
+        """Leave the network; called once."""
         raise NotImplementedError

@@ -1,7 +1,7 @@
 """How late the wall-clock loop of a board is under the demo's load: five clients in closed loops, all_hardware.
 
-The rival is SimPy's own RealtimeEnvironment with a timer alone on the idle machine: the best case of a loop that
-sleeps until each event.
+The rival is SimPy's own RealtimeEnvironment with a timer alone on the idle machine: the best case of a loop
+that sleeps until each event.
 """
 
 from __future__ import annotations

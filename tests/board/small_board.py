@@ -26,8 +26,8 @@ if TYPE_CHECKING:
     Steps = Generator[Any, Any, Any]
     """What waits for parts of a board with `yield from`."""
 
-BITSTREAM_BYTES = 1000
-"""Of every slot; the ICAP takes one byte per nanosecond."""
+BITSTREAM_BYTES = 2000
+"""Of every slot; the ICAP takes two bytes per nanosecond, so that a write takes 1000 ns."""
 
 types = cache(TypeRegistry)
 
@@ -38,6 +38,7 @@ def small_profile(
     cores: int = 2,
     hardware_poll_ns: int = 0,
     software_poll_ns: int = 0,
+    poll_jitter: float = 0,
     dispatch_ns: int = 0,
     dds_message_ns: int = 0,
     dds_byte_ns: float = 0,
@@ -45,11 +46,15 @@ def small_profile(
     large_from: int = 65536,
     nack_probability: float = 0,
     nack_delay_ns: int = 0,
+    loss_probability: float = 0,
+    heartbeat_ns: int = 0,
+    core_share: float = 1,
+    jitter: float = 0,
+    recovery_ns: int = 0,
     stalled: bool = False,
     link_ns: int = 0,
     link_byte_ns: float = 0,
     icap_offset_ns: int = 0,
-    settle_ns: int = 0,
     osif_ns: int = 0,
 ) -> Profile:
     """`callbacks` gives each name its time in software and what its slot computes; the MEMIF moves 1 B/ns."""
@@ -63,6 +68,7 @@ def small_profile(
         "executor": {
             "hardware_poll": of(hardware_poll_ns, "ns"),
             "software_poll": of(software_poll_ns, "ns"),
+            "poll_jitter": of(poll_jitter, "1"),
             "dispatch": of(dispatch_ns, "ns"),
         },
         "dds": {
@@ -72,14 +78,15 @@ def small_profile(
             "large_from": of(large_from, "B"),
             "nack_probability": of(nack_probability, "1"),
             "nack_delay": of(nack_delay_ns, "ns"),
+            "loss_probability": of(loss_probability, "1"),
+            "heartbeat_period": of(heartbeat_ns, "ns"),
+            "core_share": of(core_share, "1"),
+            "jitter": of(jitter, "1"),
+            "recovery": of(recovery_ns, "ns"),
             "stalled_by_reconfiguration": stalled,
         },
         "link": {"latency": of(link_ns, "ns"), "per_byte": of(link_byte_ns, "ns/B")},
-        "icap": {
-            "bandwidth": of(1, "GB/s"),
-            "offset": of(icap_offset_ns, "ns"),
-            "settle": of(settle_ns, "ns"),
-        },
+        "icap": {"bandwidth": of(2, "GB/s"), "offset": of(icap_offset_ns, "ns")},
         "memif": {"bandwidth": of(1, "GB/s")},
         "osif": {"call": of(osif_ns, "ns")},
         "bitstreams": [{"lut": 100, "dsp": 0, "bram36": 0, "size": of(BITSTREAM_BYTES, "B")}],

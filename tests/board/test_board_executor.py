@@ -126,8 +126,8 @@ def test_every_bitstream_has_to_be_there_before_it_spins(tmp_path: Path) -> None
 
 def test_a_bitstream_for_a_slot_of_another_size(tmp_path: Path) -> None:
     for slot in (0, 1):
-        Bitstream(slot, "a", 999).write(tmp_path)
-    with pytest.raises(BitstreamError, match="has 999 bytes; this slot takes 1000"):
+        Bitstream(slot, "a", 1999).write(tmp_path)
+    with pytest.raises(BitstreamError, match="has 1999 bytes; this slot takes 2000"):
         Loaded(tmp_path).spin()
 
 

@@ -37,6 +37,10 @@ def ends(environment: VirtualEnvironment, works: Iterable[Steps]) -> list[int]:
     return [done[index] for index in sorted(done)]
 
 
+def test_a_thread_runs_on_one_core_even_if_others_are_free(environment: VirtualEnvironment) -> None:
+    assert ends(environment, [Cpu(environment, 4).run(100)]) == [100]
+
+
 def test_threads_run_on_one_core_each(environment: VirtualEnvironment) -> None:
     cpu = Cpu(environment, 2)
     assert ends(environment, [cpu.run(100), cpu.run(100)]) == [100, 100]
@@ -49,14 +53,14 @@ def test_more_threads_than_cores_share_them(environment: VirtualEnvironment) -> 
 
 def test_the_communication_stack_comes_before_threads(environment: VirtualEnvironment) -> None:
     cpu = Cpu(environment, 1)
-    assert ends(environment, [cpu.run(100), cpu.run_stack(30)]) == [130, 30]
+    assert ends(environment, [cpu.run(100), cpu.run_stack(30, 1)]) == [130, 30]
 
 
 def test_a_stalled_stack_leaves_the_cores_to_threads(environment: VirtualEnvironment) -> None:
     cpu = Cpu(environment, 1)
     cpu.stall_stack()
     environment.call_later(500, cpu.resume_stack)
-    assert ends(environment, [cpu.run(100), cpu.run_stack(30)]) == [100, 530]
+    assert ends(environment, [cpu.run(100), cpu.run_stack(30, 1)]) == [100, 530]
 
 
 def test_a_transfer_takes_its_bytes_over_the_bandwidth(environment: VirtualEnvironment) -> None:

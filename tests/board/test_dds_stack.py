@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import random
 from typing import TYPE_CHECKING
 
@@ -28,6 +29,8 @@ PROFILE = small_profile(
     large_from=1000,
     nack_probability=0.1,
     nack_delay_ns=10_000,
+    loss_probability=0.2,
+    heartbeat_ns=1_000_000,
 )
 
 
@@ -40,6 +43,9 @@ class Script(random.Random):
 
     def random(self) -> float:
         return self.numbers.pop(0)
+
+    def lognormvariate(self, mu: float = 0, sigma: float = 1) -> float:
+        return math.exp(mu + sigma * self.random())
 
 
 class Stack:
@@ -95,27 +101,62 @@ def test_a_sender_whose_clock_is_ahead_does_not_lengthen_the_link() -> None:
 
 
 def test_a_large_message_costs_more_per_byte() -> None:
-    assert Stack(PROFILE, 0.5).receive(1000)["dds"] == 100 + 1000 * 3
-    assert Stack(PROFILE, 0.5).receive(1001)["dds"] == 100 + 1001 * 5
+    assert Stack(PROFILE).receive(1000)["dds"] == 100 + 1000 * 3
+    assert Stack(PROFILE, 0.5, 0.5).receive(1001)["dds"] == 100 + 1001 * 5
 
 
-def test_a_large_message_that_is_lost_is_sent_again_until_it_is_not() -> None:
-    stack = Stack(PROFILE, 0.09, 0.0, 0.1)
-    once_more = 10_000 + 2000 * 2 + 100 + 2000 * 5
+def test_the_stack_works_on_a_fragment_while_the_next_ones_are_on_the_link() -> None:
+    assert Stack(PROFILE, 0.5, 0.5).receive(2000) == {"transport": 500 + 1000 * 2, "dds": 100 + 2000 * 5}
+    assert Stack(PROFILE, 0.5, 0.5).send(2000) == {"dds": 100 + 2000 * 5, "transport": 500 + 1000 * 2}
+
+
+def test_a_link_slower_than_the_stack_decides() -> None:
+    slow = small_profile(link_ns=500, link_byte_ns=20, dds_byte_large_ns=5, large_from=1000)
+    assert sum(Stack(slow, 0.5, 0.5).receive(2000).values()) == 500 + 2000 * 20
+    assert sum(Stack(slow, 0.5, 0.5).send(2000).values()) == 500 + 2000 * 20
+
+
+def test_a_large_message_with_a_lost_fragment_is_sent_again_until_it_is_whole() -> None:
+    stack = Stack(PROFILE, 0.5, 0.09, 0.0, 0.1)
     assert stack.receive(2000) == {
-        "transport": 500 + 4000,
+        "transport": 500 + 2000,
         "dds": 100 + 10_000,
-        "retransmission": 2 * once_more,
+        "retransmission": 2 * (10_000 + 100 + 10_000),
     }
     assert stack.draws.numbers == []
 
 
 def test_what_the_board_sends_can_be_lost_too() -> None:
-    assert Stack(PROFILE, 0.05, 0.9).send(2000) == {
+    assert Stack(PROFILE, 0.5, 0.05, 0.9).send(2000) == {
         "dds": 10_100,
-        "retransmission": 10_000 + 4000 + 10_100,
-        "transport": 4500,
+        "retransmission": 10_000 + 10_100,
+        "transport": 2500,
     }
+
+
+def test_a_large_message_whose_resend_is_lost_too_waits_for_the_heartbeat() -> None:
+    assert Stack(PROFILE, 0.19, 0.25, 0.9).receive(2000)["retransmission"] == 250_000
+
+
+def test_a_small_message_waits_behind_a_large_one_of_another_node_and_direction() -> None:
+    stack = Stack(PROFILE, 0.5, 0.5)
+    large, small = (Timeline(stack.environment, 0) for _ in range(2))
+    start(stack.environment, stack._stack.send(2000, large))
+    stack.environment.run(until=start(stack.environment, stack._stack.receive(8, 0, small)))
+    assert stages(small) == {"transport": 516, "dds": 10_100 - 516 + 124}
+
+
+def test_a_stack_that_waits_for_the_network_half_the_time_leaves_half_a_core() -> None:
+    stack = Stack(small_profile(dds_message_ns=100, core_share=0.5))
+    thread = start(stack.environment, stack.cpu.run(200))
+    assert stack.receive(0) == {"dds": 100}
+    stack.environment.run(until=thread)
+    assert stack.environment.now == 250
+
+
+def test_the_times_of_the_stack_vary() -> None:
+    profile = small_profile(dds_message_ns=1000, jitter=0.1)
+    assert Stack(profile, 2.0).receive(0)["dds"] == math.ceil(1000 * math.exp(0.2))
 
 
 def test_a_small_message_is_never_lost() -> None:
@@ -142,3 +183,11 @@ def test_without_a_model_a_message_costs_nothing(direction: str) -> None:
 def test_without_a_model_the_time_in_the_real_network_is_accounted_for() -> None:
     stack = Stack(small_profile().model_copy(update={"model": None}))
     assert stack.receive(8, transit_ns=700) == {"transport": 700}
+
+
+def test_without_a_model_what_a_message_waited_to_be_sent_is_accounted_for() -> None:
+    stack = Stack(small_profile().model_copy(update={"model": None}))
+    timeline = Timeline(stack.environment, 0)
+    stack.environment.run(until=50)
+    stack.environment.run(until=start(stack.environment, stack._stack.send(8, timeline)))
+    assert stages(timeline) == {"dds": 50}

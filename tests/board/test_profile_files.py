@@ -125,7 +125,7 @@ MISTAKES = {
         "model.cores.count.value: Input should be greater than or equal to 1",
     ),
     "half a core": ("count = { value = 2", "count = { value = 1.5", "count = {", "model.cores.count.value"),
-    "more than all": ("value = 0.13", "value = 1.3", "nack_probability =", "less than or equal to 1"),
+    "more than all": ("value = 0.17", "value = 1.7", "nack_probability =", "less than or equal to 1"),
     "unknown unit": (
         'value = 666, unit = "MHz"',
         'value = 666, unit = "rpm"',

@@ -14,7 +14,7 @@ from reconros_zenoh.board.sharing import SharedResource
 from reconros_zenoh.clock.virtual import VirtualEnvironment
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from small_board import Steps
 
@@ -23,6 +23,7 @@ class Job(NamedTuple):
     arrives_ns: int
     work: float
     first: bool = False
+    limit: float | None = None
 
 
 class Hold(NamedTuple):
@@ -46,7 +47,7 @@ def ends(
 
     def run(index: int, job: Job) -> Steps:
         yield environment.timeout(job.arrives_ns)
-        yield from resource.serve(job.work, first=job.first)
+        yield from resource.serve(job.work, job.limit, first=job.first)
         done[index] = environment.now
 
     for each in holds:
@@ -66,7 +67,12 @@ def test_a_job_alone_on_two_cores_uses_one_of_them() -> None:
 
 
 def test_no_work_is_done_at_once() -> None:
-    assert ends([Job(0, 100), Job(10, 0)]) == [100, 10]
+    assert ends([Job(0, 100), Job(10, 0), Job(10, -1)]) == [100, 10, 10]
+
+
+def test_the_least_work_takes_a_nanosecond() -> None:
+    assert ends([Job(0, 1)]) == [1]
+    assert ends([Job(0, 0.001)]) == [1]
 
 
 def test_two_equal_jobs_on_one_core_take_twice_as_long() -> None:
@@ -106,6 +112,20 @@ def test_first_jobs_share_among_themselves_and_others_get_what_is_left() -> None
     assert ends([Job(0, 100, first=True)] * 3 + [Job(0, 100)], capacity=2) == [150, 150, 150, 250]
 
 
+def test_a_job_gets_no_more_than_its_limit() -> None:
+    assert ends([Job(0, 100, limit=0.4)]) == [250]
+
+
+def test_what_a_limited_job_leaves_goes_to_others() -> None:
+    # 0.25 to the first; the second has 0.75 until 100 and then the whole core.
+    assert ends([Job(0, 25, limit=0.25), Job(0, 175)]) == [100, 200]
+    assert ends([Job(0, 25, first=True, limit=0.25), Job(0, 175)]) == [100, 200]
+
+
+def test_a_limit_above_an_equal_share_does_not_matter() -> None:
+    assert ends([Job(0, 100, limit=0.9), Job(0, 100), Job(0, 100)]) == [300] * 3
+
+
 def test_held_first_jobs_wait_and_leave_the_core_to_others() -> None:
     assert ends([Job(0, 100, first=True), Job(0, 100)], [Hold(40, 1000)]) == [1060, 140]
 
@@ -131,16 +151,23 @@ def test_work_that_is_done_when_a_hold_begins_does_not_wait_for_its_end() -> Non
 times = st.integers(0, 60) | st.integers(0, 3000)
 works = st.integers(0, 60) | st.integers(0, 2000) | st.floats(0, 2000, allow_subnormal=False)
 machines = st.sampled_from([(1, 1), (2, 1), (3, 1), (0.4, 0.4), (2.5, 0.75), (1, 3)])
-any_jobs = st.lists(st.builds(Job, times, works, st.booleans()), min_size=1, max_size=8)
-equal_jobs = st.lists(st.builds(Job, times, works, st.just(False)), min_size=1, max_size=8)
+limits = st.sampled_from([None, 0.25, 0.3])
+any_jobs = st.lists(st.builds(Job, times, works, st.booleans(), limits), min_size=1, max_size=8)
+equal_jobs = st.lists(st.builds(Job, times, works, st.just(value=False), st.none()), min_size=1, max_size=8)
 any_holds = st.lists(st.tuples(times, times).map(lambda pair: Hold(min(pair), max(pair))), max_size=3)
 
 
-def shares(first: int, others: int, capacity: Fraction, per_job: Fraction) -> tuple[Fraction, Fraction]:
-    """What each of the jobs served first gets and what each of the others."""
-    each_first = min(per_job, capacity / first) if first else Fraction(0)
-    left = capacity - each_first * first
-    return each_first, min(per_job, left / others) if others else Fraction(0)
+def max_min_fair(limits: Mapping[int, Fraction], capacity: Fraction) -> dict[int, Fraction]:
+    """What each job gets when all rates grow alike until a job has its limit or nothing is left."""
+    rates = dict.fromkeys(limits, Fraction(0))
+    growing = set(limits)
+    while growing and capacity > 0:
+        step = min(capacity / len(growing), *(limits[i] - rates[i] for i in growing))
+        for i in growing:
+            rates[i] += step
+        capacity -= step * len(growing)
+        growing = {i for i in growing if rates[i] < limits[i]}
+    return rates
 
 
 @given(any_jobs, any_holds, machines)
@@ -150,6 +177,10 @@ def test_every_job_gets_its_fair_share_until_its_work_is_done_and_no_longer(
     """Adds up, in exact fractions, what each job must have got while it was there."""
     capacity, per_job = machine
     done_ns = ends(jobs, holds, capacity=capacity, per_job=per_job)
+
+    def is_there(i: int, now_ns: int) -> bool:
+        return jobs[i].arrives_ns <= now_ns < done_ns[i]
+
     left = [Fraction(job.work) for job in jobs]
     rate = [Fraction(0)] * len(jobs)
     instants = (
@@ -157,13 +188,14 @@ def test_every_job_gets_its_fair_share_until_its_work_is_done_and_no_longer(
     )
     for now_ns, next_ns in pairwise(sorted(instants)):
         held = any(begin <= now_ns < end for begin, end in holds)
-        present = [i for i, job in enumerate(jobs) if job.arrives_ns <= now_ns < done_ns[i]]
-        served_first = [i for i in present if jobs[i].first and not held]
-        others = [i for i in present if not jobs[i].first]
-        each_first, each_other = shares(len(served_first), len(others), Fraction(capacity), Fraction(per_job))
+        present = {i: Fraction(job.limit or per_job) for i, job in enumerate(jobs) if is_there(i, now_ns)}
+        first = {i: limit for i, limit in present.items() if jobs[i].first}
+        others = {i: limit for i, limit in present.items() if not jobs[i].first}
+        now_first = dict.fromkeys(first, Fraction(0)) if held else max_min_fair(first, Fraction(capacity))
+        now = now_first | max_min_fair(others, Fraction(capacity) - sum(now_first.values()))
         for i in present:
             assert left[i] > 0, "nobody stays whose work is done"
-            rate[i] = each_first if i in served_first else each_other if i in others else Fraction(0)
+            rate[i] = now[i]
             left[i] -= rate[i] * (next_ns - now_ns)
     for i, job in enumerate(jobs):
         assert left[i] < 1e-6, "done means that nothing is left"
@@ -222,7 +254,7 @@ def test_jobs_that_come_together_on_one_core(works: list[int]) -> None:
         assert abs(got[index] - end_ns) <= len(works)
 
 
-@given(any_jobs, machines)
+@given(st.lists(st.builds(Job, times, works, st.booleans(), st.none()), min_size=1, max_size=8), machines)
 def test_without_holds_the_last_job_ends_when_all_work_is_done(
     jobs: list[Job], machine: tuple[float, float]
 ) -> None:

@@ -19,15 +19,15 @@ if TYPE_CHECKING:
     from reconros_zenoh.board.board import Board
 
 OFFSET_NS = 70
-SETTLE_NS = 40
-WRITE_NS = BITSTREAM_BYTES + OFFSET_NS  # t_rc = S / B + t_offset at one byte per nanosecond
+RECOVERY_NS = 40
+WRITE_NS = BITSTREAM_BYTES // 2 + OFFSET_NS  # t_rc = S / B + t_offset at two bytes per nanosecond
 
 
 def board_with_slots(slots: int, *, stalled: bool = False, cores: int = 1, dds_message_ns: int = 0) -> Board:
     return small_board(
         small_profile(
             icap_offset_ns=OFFSET_NS,
-            settle_ns=SETTLE_NS,
+            recovery_ns=RECOVERY_NS,
             stalled=stalled,
             cores=cores,
             dds_message_ns=dds_message_ns,
@@ -44,35 +44,36 @@ def write(board: Board, log: list[tuple[int, str]], slot: int, callback: str) ->
     return start(board.environment, run())
 
 
-def test_a_write_takes_the_size_over_the_bandwidth_and_the_offset_and_then_the_slot_settles() -> None:
+def test_a_write_takes_the_size_over_the_bandwidth_and_the_offset() -> None:
     board = board_with_slots(1)
     log: list[tuple[int, str]] = []
     write(board, log, 0, "sobel")
     board.environment.run()
-    assert log == [(1000 + 70 + 40, "slot 0 holds sobel")]
+    assert log == [(1000 + 70, "slot 0 holds sobel")]
     assert board.slots[0].holds == Bitstream(0, "sobel", BITSTREAM_BYTES)
     assert board.slots[0].reconfigurations == 1
-    assert board.slots[0].reconfiguration_ns == 1110
+    assert board.slots[0].reconfiguration_ns == 1070
 
 
 def test_the_bandwidth_of_the_profile_counts() -> None:
     zycap = board_with_slots(1).zycap
-    assert [zycap.reconfiguration_ns(size) for size in (0, 1, 2_838_976)] == [70, 71, 2_839_046]
+    assert [zycap.reconfiguration_ns(size) for size in (0, 10, 2_838_976)] == [70, 75, 1_419_558]
 
 
 def test_two_slots_reconfigured_at_once_queue_for_the_one_icap() -> None:
     board = board_with_slots(3)
+    board.environment.run(until=400)
     log: list[tuple[int, str]] = []
     for slot in (1, 0, 2):
         write(board, log, slot, "sobel")
     board.environment.run()
     assert log == [
-        (1110, "slot 1 holds sobel"),
-        (2220, "slot 0 holds sobel"),
-        (3330, "slot 2 holds sobel"),
+        (400 + 1070, "slot 1 holds sobel"),
+        (400 + 2140, "slot 0 holds sobel"),
+        (400 + 3210, "slot 2 holds sobel"),
     ]
     # What a slot waited counts as reconfiguration, too.
-    assert [board.slots[slot].reconfiguration_ns for slot in (0, 1, 2)] == [2220, 1110, 3330]
+    assert [board.slots[slot].reconfiguration_ns for slot in (0, 1, 2)] == [2140, 1070, 3210]
 
 
 def test_a_slot_that_holds_the_bitstream_is_not_written_even_while_the_icap_is_busy() -> None:
@@ -83,9 +84,9 @@ def test_a_slot_that_holds_the_bitstream_is_not_written_even_while_the_icap_is_b
     write(board, log, 0, "sobel")
     board.environment.run()
     assert log == [
-        (1110, "slot 0 holds sobel"),
-        (1110, "slot 0 holds sobel"),
-        (2220, "slot 1 holds mnist"),
+        (1070, "slot 0 holds sobel"),
+        (1070, "slot 0 holds sobel"),
+        (2140, "slot 1 holds mnist"),
     ]
     assert board.slots[0].reconfigurations == 1
 
@@ -109,7 +110,7 @@ def test_a_slot_is_written_if_and_only_if_it_does_not_hold_that_bitstream(
         before_ns = board.environment.now
         board.environment.run(until=write(board, [], slot, callback))
         differs = holds.get(slot) != callback
-        assert board.environment.now - before_ns == (WRITE_NS + SETTLE_NS if differs else 0)
+        assert board.environment.now - before_ns == (WRITE_NS if differs else 0)
         changes[slot] += differs
         holds[slot] = callback
         in_slot = board.slots[slot].holds
@@ -121,10 +122,11 @@ def test_a_slot_is_written_if_and_only_if_it_does_not_hold_that_bitstream(
 @pytest.mark.parametrize(
     ("stalled", "expected"),
     [
-        # The stack has the core until 100, then from the end of the write, 100 ns before the slot has
-        # settled.
-        (True, [(700, "thread"), (WRITE_NS + 100, "message"), (WRITE_NS + SETTLE_NS, "slot 0 holds sobel")]),
-        (False, [(200, "message"), (800, "thread"), (WRITE_NS + SETTLE_NS, "slot 0 holds sobel")]),
+        (
+            True,
+            [(700, "thread"), (WRITE_NS, "slot 0 holds sobel"), (WRITE_NS + RECOVERY_NS + 100, "message")],
+        ),
+        (False, [(200, "message"), (800, "thread"), (WRITE_NS, "slot 0 holds sobel")]),
     ],
     ids=["stalled", "not stalled"],
 )
@@ -140,18 +142,18 @@ def test_the_communication_stack_stalls_during_a_write_if_the_profile_says_so(
         log.append((board.environment.now, name))
 
     write(board, log, 0, "sobel")
-    start(board.environment, work("message", board.cpu.run_stack(100)))
+    start(board.environment, work("message", board.cpu.run_stack(100, 1)))
     start(board.environment, work("thread", board.cpu.run(600)))
     board.environment.run()
     assert sorted(log) == sorted(expected)
 
 
-def test_the_stack_goes_on_between_two_writes_while_the_first_slot_settles() -> None:
+def test_the_stack_does_not_recover_between_two_writes_in_a_row() -> None:
     board = board_with_slots(2, stalled=True)
     log: list[tuple[int, str]] = []
 
     def message() -> Steps:
-        yield from board.cpu.run_stack(60)
+        yield from board.cpu.run_stack(60, 1)
         log.append((board.environment.now, "message"))
 
     write(board, log, 0, "sobel")
@@ -159,11 +161,10 @@ def test_the_stack_goes_on_between_two_writes_while_the_first_slot_settles() -> 
     board.environment.run(until=1)
     start(board.environment, message())
     board.environment.run()
-    # 40 ns of it while slot 0 settles, the other 20 ns after the second write.
     assert log == [
-        (1110, "slot 0 holds sobel"),
-        (1110 + WRITE_NS + 20, "message"),
-        (2220, "slot 1 holds sobel"),
+        (WRITE_NS, "slot 0 holds sobel"),
+        (2 * WRITE_NS, "slot 1 holds sobel"),
+        (2 * WRITE_NS + RECOVERY_NS + 60, "message"),
     ]
 
 

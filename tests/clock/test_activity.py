@@ -134,8 +134,9 @@ def test_a_signal_happens_once_and_is_not_waited_for_any_more() -> None:
         yield signal
         log.append("second")
 
-    Activity(work())
     signal.fire()
+    Activity(work())
+    assert log == ["first", "second"]
     signal.fire()
     assert log == ["first", "second"]
 

@@ -68,12 +68,10 @@ def test_events_happen_in_the_order_of_their_times_and_none_before_its_time(dela
     assert calls == sorted((delay, number) for number, delay in enumerate(delays))
 
 
-def test_the_loop_sleeps_for_an_event_far_ahead_and_does_not_begin_early() -> None:
+def test_an_event_for_which_the_loop_sleeps_does_not_happen_early() -> None:
     environment = WallEnvironment()
-    sleeps = watch(environment)
     due_ns = environment.now + 20 * MS
     environment.run(until=environment.timeout(20 * MS))
-    assert sleeps.is_set()
     assert environment.now == due_ns <= time.monotonic_ns()
 
 

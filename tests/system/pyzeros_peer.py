@@ -13,6 +13,7 @@ import sys
 import time
 from queue import SimpleQueue
 from threading import Event
+from typing import Any
 
 import pyzeros
 import pyzeros.node
@@ -22,7 +23,7 @@ from ros2_pyterfaces.cyclone.std_msgs.msg import UInt32
 
 LIMIT_S = 30
 NODES = ("inverse_node", "mnist_node", "sobel_node", "sort_node", "hash_node")
-ANY = {"_zenoh_id": "*", "_node_id": "*", "_entity_id": "*"}
+ANY: Any = {"_zenoh_id": "*", "_node_id": "*", "_entity_id": "*"}
 
 
 def open_session(endpoint: str) -> zenoh.Session:
@@ -36,7 +37,7 @@ def open_session(endpoint: str) -> zenoh.Session:
 def wait_for_token(session: zenoh.Session, key: str) -> None:
     """Return when a liveliness token of this key is there."""
     there = Event()
-    watch = session.liveliness().declare_subscriber(key, lambda _: there.set(), history=True)
+    watch: Any = session.liveliness().declare_subscriber(key, lambda _: there.set(), history=True)
     assert there.wait(LIMIT_S), key
     watch.undeclare()
 
@@ -51,14 +52,10 @@ def main(endpoint: str, angle: int) -> None:
         for name in NODES:
             wait_for_token(session, pyzeros.node.token_keyexpr(name, session, domain_id=0, **ANY))
         subscription = pyzeros.sub.RawSub(
-            UInt32,
-            "/legangle",
-            lambda sample: answers.put(sample.payload.to_bytes()),
-            session=node,
-            scope=None,
+            UInt32, "/legangle", lambda sample: answers.put(sample.payload.to_bytes()), session=node
         )
-        publisher = pyzeros.Pub(UInt32, "/angle", session=node, scope=None)
-        publisher.zenoh_pub.declare_matching_listener(lambda status: status.matching and heard.set())
+        publisher: Any = pyzeros.Pub(UInt32, "/angle", session=node)
+        publisher.zenoh_pub.declare_matching_listener(lambda _: heard.set())
         assert publisher.zenoh_pub.matching_status.matching or heard.wait(LIMIT_S)
         attachment = struct.pack("<qqB16s", 1, time.time_ns(), 16, publisher.gid.tobytes())
         publisher.zenoh_pub.put(UInt32(data=angle).serialize(), attachment=attachment)

@@ -1,4 +1,4 @@
-"""`reconros client`, also as `python -m host_clients`."""
+"""`python -m host_clients`, which is `reconros client`."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import json
 from typing import TYPE_CHECKING
 
 import pytest
-from processes import RECONROS, run
+from processes import run
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -14,15 +14,11 @@ if TYPE_CHECKING:
     from conftest import Network
 
 
-@pytest.mark.parametrize(
-    "program", [(*RECONROS, "client"), ("-m", "host_clients")], ids=["reconros", "host_clients"]
-)
-def test_a_client_records_and_prints_its_round_trips(
-    network: Network, tmp_path: Path, program: tuple[str, ...]
-) -> None:
+def test_a_client_records_and_prints_its_round_trips(network: Network, tmp_path: Path) -> None:
     record = tmp_path / "new folder" / "sort.csv"
     done = run(
-        *("sort", "--requests=3", "--router", network.endpoint, "--out", record, "--json"), program=program
+        *("sort", "--requests=3", "--router", network.endpoint, "--out", record, "--json"),
+        program=("-m", "host_clients"),
     )
     assert (done.returncode, done.stderr) == (0, "")
     summary = json.loads(done.stdout)

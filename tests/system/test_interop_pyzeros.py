@@ -26,7 +26,7 @@ def test_a_foreign_node_sees_our_nodes_is_seen_and_is_answered(
 
     def on_token(key: str, alive: bool) -> None:
         node = parse(key)
-        if alive and isinstance(node, NodeToken) and node.node_name == "independent_peer":
+        if alive and isinstance(node, NodeToken) and node.node == "independent_peer":
             seen.set()
 
     watch = network.transport.watch_tokens("@ros2_lv/0/**", on_token)

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from itertools import count
 from threading import Event
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from processes import LIMIT_S, Process
 
 from host_clients.suite import exchange
-from reconros_zenoh.applications.roundtrip.kernels.inverse import inverse_kinematics
 from reconros_zenoh.rmw.node import Context
 from reconros_zenoh.transport.zenoh import ZenohRouter, ZenohTransport
 
@@ -29,10 +28,10 @@ class Server:
     """Serves /angle as a board does, but for three requests of its client; it runs on Zenoh's threads."""
 
     def __init__(self, transport: ZenohTransport, types: TypeRegistry) -> None:
-        inverse = exchange("inverse", SEED)
+        inverse: Any = exchange("inverse", SEED)
         # A request is known by its content; the client's inputs begin with those of its first requests.
-        self._angles = [inverse.request(types, given).data for given in inverse._inputs]
-        self.answers = [inverse.expected(index) for index in range(len(self._angles))]
+        self._angles: list[int] = [inverse.request(types, given).data for given in inverse._inputs]
+        self.answers: list[int] = [inverse.expected(index) for index in range(len(self._angles))]
         self._late: list[int] = []
         number = types.message("std_msgs/msg/UInt32")
         self._answer_type = number.cls
@@ -49,7 +48,7 @@ class Server:
             return
         while self._late:
             self._answer(self._late.pop())
-        self._answer(NEVER_RIGHT if index == WRONG else inverse_kinematics(received.message.data))
+        self._answer(NEVER_RIGHT if index == WRONG else self.answers[index])
 
     def _answer(self, word: int) -> None:
         self._publisher.publish(self._answer_type(data=word))
@@ -86,6 +85,7 @@ def test_the_requests_to_a_server_that_has_gone_are_lost(
         if next(answered) > 3:
             waiting.set()
             return
+        assert received.responder is not None
         numbers = np.sort(received.message.unsorted)
         received.responder.respond_encoded(service.response.encode(service.response.cls(sorted=numbers)))
 
