@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from host_clients.exchange import TopicExchange
 from host_clients.image import image_message
 from reconros_zenoh.applications.roundtrip.inputs import digits
-from reconros_zenoh.applications.roundtrip.kernels.mnist import Classifier
+from reconros_zenoh.applications.roundtrip.kernels.mnist import shipped_classifier
 
 if TYPE_CHECKING:
     from numpy.random import Generator
@@ -31,7 +31,7 @@ class MnistExchange(TopicExchange):
     def __init__(self, rng: Generator) -> None:
         images, _ = digits()
         super().__init__(list(rng.permutation(images)))
-        self._classifier = Classifier()
+        self._classifier = shipped_classifier()
 
     def request(self, types: TypeRegistry, given: Any) -> object:
         """Return the digit as a message."""

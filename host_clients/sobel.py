@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from host_clients.exchange import TopicExchange
 from host_clients.image import image_message
 from reconros_zenoh.applications.roundtrip.inputs import images
@@ -11,6 +13,7 @@ from reconros_zenoh.applications.roundtrip.kernels.sobel import sobel
 
 if TYPE_CHECKING:
     from numpy.random import Generator
+    from numpy.typing import NDArray
 
     from reconros_zenoh.ros.types import TypeRegistry
 
@@ -31,10 +34,10 @@ class SobelExchange(TopicExchange):
         """Return the picture as a message."""
         return image_message(types, "bgr8", given)
 
-    def expected(self, index: int) -> bytes:
+    def expected(self, index: int) -> NDArray[np.uint8]:
         """Return what the kernel computes."""
-        return sobel(self._inputs[index]).tobytes()
+        return sobel(self._inputs[index]).reshape(-1)
 
-    def equal(self, message: Any, expected: bytes) -> bool:
+    def equal(self, message: Any, expected: NDArray[np.uint8]) -> bool:
         """Compare all pixels."""
-        return bool(message.encoding == "bgr8" and message.data.tobytes() == expected)
+        return bool(message.encoding == "bgr8" and np.array_equal(message.data, expected))

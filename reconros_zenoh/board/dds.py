@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 # More than any board has under way at once: the queues of readers and writers are the ones that overflow.
 _BACKLOG = 1_000_000
+_TRANSITS_REMEMBERED = 8
 
 
 class _Passage(NamedTuple):
@@ -41,7 +42,8 @@ class DdsStack:
 
     The link is charged here rather than in the transport, so that the same model holds in both clocks. In
     wall time a message has spent some of the modelled link time in the real network already: its source
-    timestamp says how much, and only the rest is waited for.
+    timestamp says how much, and only the rest is waited for. What the board sends is expected to take as long
+    in the real network as what it got lately, and leaves that much earlier.
     """
 
     def __init__(
@@ -51,6 +53,9 @@ class DdsStack:
         self._cpu = cpu
         self._randomness = randomness
         self._modelled = model is not None
+        # How long small and large messages lately were on their way in the real network; nothing in virtual
+        # time.
+        self._transit_ns = {False: 0.0, True: 0.0}
         self._passages: Stream[_Passage] = Stream(self._pass, _BACKLOG)
         if model is not None:
             dds, link = model.dds, model.link
@@ -68,11 +73,17 @@ class DdsStack:
             self._heartbeat_ns = dds.heartbeat_period.ns
 
     def receive(self, size: int, transit_ns: int, timeline: Timeline) -> Generator[Awaitable, object, None]:
-        """Return when a message of `size` bytes that left `transit_ns` ago has come through the stack."""
+        """Return when a message of `size` bytes has come through the stack.
+
+        It left when its timeline started and was in the real network for `transit_ns`.
+        """
         if not self._modelled:
             timeline.mark("transport")
             return
-        left_ns = self._environment.now - max(0, transit_ns)
+        large = size > self._large_from
+        known_ns = min(max(0, transit_ns), self._link_ns(size))
+        self._transit_ns[large] += (known_ns - self._transit_ns[large]) / _TRANSITS_REMEMBERED
+        left_ns = min(timeline.started_ns, self._environment.now)
         yield from self._until(left_ns + self._link_ns(min(size, self._large_from)))
         timeline.mark("transport")
         yield from self._process(size)
@@ -90,7 +101,8 @@ class DdsStack:
         timeline.mark("dds")
         yield from self._repair(size, timeline)
         last_fragment_ns = self._environment.now + self._link_ns(min(size, self._large_from))
-        yield from self._until(max(last_fragment_ns, began_ns + self._link_ns(size)))
+        arrives_ns = max(last_fragment_ns, began_ns + self._link_ns(size))
+        yield from self._until(arrives_ns - round(self._transit_ns[size > self._large_from]))
         timeline.mark("transport")
 
     def _link_ns(self, size: int) -> int:

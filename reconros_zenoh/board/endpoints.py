@@ -97,9 +97,7 @@ class Reader:
 
     def _receive(self, item: tuple[Received, Timeline]) -> Generator[Awaitable, object, None]:
         received, timeline = item
-        # What it waited behind its predecessor counts as time on the way.
-        transit_ns = self._board.environment.now - timeline.started_ns
-        yield from self._board.dds.receive(received.size, transit_ns, timeline)
+        yield from self._board.dds.receive(received.size, received.transit_ns, timeline)
         if len(self._queue) == self._queue.maxlen:
             self._overwritten += 1
         self._queue.append(Event(received.message, timeline, received.responder))

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from reconros_zenoh.board.bitstream_fit import BitstreamFit, frames
 from reconros_zenoh.board.quantity import (
     Bandwidth,
     CostPerByte,
@@ -15,6 +16,7 @@ from reconros_zenoh.board.quantity import (
     Duration,
     Fraction,
     Frequency,
+    PositiveSize,
     Share,
     Size,
 )
@@ -118,7 +120,12 @@ class BitstreamSection(_Section):
     lut: Annotated[int, Field(gt=0)]
     dsp: Annotated[int, Field(ge=0)]
     bram36: Annotated[int, Field(ge=0)]
-    size: Size
+    size: PositiveSize
+
+    @property
+    def frames(self) -> float:
+        """The configuration frames of these resources."""
+        return frames(self.lut, self.dsp, self.bram36)
 
 
 class CallbackSection(_Section):
@@ -157,7 +164,7 @@ class Profile(_Section):
     def bitstream_size(self, lut: int, dsp: int, bram36: int) -> int:
         """Return the size [bytes] of a partial bitstream of a slot with these resources.
 
-        A slot that the profile does not list gets the size per LUT of the listed slots together.
+        The size of a slot that the profile does not list is estimated from those it lists.
         """
         if self.model is None:
             return _NATIVE_BITSTREAM_SIZE
@@ -165,7 +172,8 @@ class Profile(_Section):
         for slot in known:
             if (slot.lut, slot.dsp, slot.bram36) == (lut, dsp, bram36):
                 return slot.size.bytes
-        return round(lut * sum(slot.size.bytes for slot in known) / sum(slot.lut for slot in known))
+        fit = BitstreamFit.of([(slot.frames, slot.size.bytes) for slot in known])
+        return fit.size(frames(lut, dsp, bram36))
 
 
 def profile_names() -> list[str]:

@@ -90,6 +90,12 @@ class Size(Quantity):
         return round(self._scaled)
 
 
+class PositiveSize(Size):
+    """A number of bytes; more than nothing."""
+
+    value: Annotated[float, Field(gt=0, allow_inf_nan=False)]
+
+
 class Fraction(Quantity):
     """A share between 0 and 1."""
 

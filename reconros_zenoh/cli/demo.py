@@ -8,11 +8,17 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
+from reconros_zenoh.board.profile import read_profile
 from reconros_zenoh.cli.experiment import MAPPINGS, ClockName, Out, plan, run
+from reconros_zenoh.cli.progress import run_bar
+from reconros_zenoh.experiments.ablation import MECHANISMS, ablate
 from reconros_zenoh.experiments.roundtrip import all_right
 from reconros_zenoh.measure.compare import print_tables
 from reconros_zenoh.measure.report import write_report
 from reconros_zenoh.measure.run import load_run
+
+_PROFILE = "miniitx-zynq7100"
+_ABLATION_REQUESTS = 200
 
 
 def demo(
@@ -20,17 +26,23 @@ def demo(
     wall_requests: Annotated[int, typer.Option(min=1, help="Requests per client in wall time.")] = 100,
     virtual_requests: Annotated[int, typer.Option(min=1, help="Requests per client in virtual time.")] = 1000,
 ) -> None:
-    """Run the round-trip experiment in wall time, then in virtual time, and write a report."""
+    """Run the round-trip experiment in wall time, then in virtual time, and write a report.
+
+    The report also says what each mechanism of the board model is worth: runs in virtual time without it.
+    """
     console = Console()
     experiments = []
     for clock, requests in ((ClockName.WALL, wall_requests), (ClockName.VIRTUAL, virtual_requests)):
-        experiment = run(plan(clock, MAPPINGS, requests, 0, out, "miniitx-zynq7100"), quiet=False)
+        planned = plan(clock, MAPPINGS, requests, 0, out, _PROFILE)
+        experiment = run(planned, quiet=False)
         print_tables(console, experiment)
         if experiment["interrupted"]:
             raise typer.Exit(130)
         experiments.append(experiment)
+    with run_bar("what each mechanism is worth", len(MECHANISMS) * len(MAPPINGS), quiet=False) as advance:
+        ablation = ablate(read_profile(_PROFILE), planned.mappings, _ABLATION_REQUESTS, 0, advance)
     runs = [load_run(out / clock) for clock in ClockName]
     report = out / "report.html"
-    write_report(report, [experiment for experiment, _ in runs], [records for _, records in runs])
+    write_report(report, [experiment for experiment, _ in runs], [records for _, records in runs], ablation)
     print(f"report: {report}")
     raise typer.Exit(0 if all(map(all_right, experiments)) else 1)

@@ -15,9 +15,11 @@ from reconros_zenoh.errors import ReconrosError, TransportError, UsageError
 _VERBS = {
     "demo": ("demo", "demo"),
     "experiment": ("experiment", "app"),
+    "calibrate": ("calibrate", "calibrate"),
     "hist": ("hist", "hist"),
     "up": ("up", "up"),
     "down": ("up", "down"),
+    "simulate": ("simulate", "simulate"),
     "router": ("daemons", "router"),
     "board": ("daemons", "board"),
     "client": ("daemons", "client"),
@@ -30,8 +32,9 @@ _VERBS = {
 def main() -> None:
     """Run the command of this process's arguments and exit.
 
-    Status 0: it did what was asked; 1: an experiment failed or an answer was wrong; 2: what was given cannot
-    be used; 130 and 143: ended by Ctrl-C and SIGTERM.
+    Status 0: it did what was asked (router and board: until a signal came); 1: an experiment failed, or an
+    answer was wrong or lost; 2: what was given cannot be used; 130: ended by Ctrl-C or SIGTERM before its
+    end.
     """
     logging.basicConfig(level=logging.INFO, format="%(levelname)s %(name)s: %(message)s")
     signal.signal(signal.SIGTERM, _end)
@@ -58,6 +61,7 @@ def _application(verbs: list[str]) -> typer.Typer:
         help="ReconROS without the board: ROS 2 callbacks on emulated CPU+FPGA boards over Zenoh.",
         no_args_is_help=True,
         pretty_exceptions_enable=False,
+        rich_markup_mode=None,
         add_completion=False,
     )
     application.callback()(lambda: None)
@@ -78,4 +82,4 @@ def _fail(error: ReconrosError, status: int) -> None:
 
 def _end(*_: object) -> None:
     """End on SIGTERM as on Ctrl-C: through every `finally`."""
-    sys.exit(128 + signal.SIGTERM)
+    sys.exit(130)

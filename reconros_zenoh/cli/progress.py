@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import contextmanager
+from functools import partial
 from typing import TYPE_CHECKING, Self
 
 from rich.console import Console
@@ -10,6 +12,8 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from reconros_zenoh.experiments.roundtrip import CLIENTS
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
     from reconros_zenoh.experiments.roundtrip import Plan
 
 
@@ -51,3 +55,20 @@ class ExperimentProgress:
         self._left -= 1
         if not self._left and not self._console.is_terminal:
             self._console.print(f"{self._plan.clock} time, {mapping}: done")
+
+
+@contextmanager
+def run_bar(what: str, runs: int, *, quiet: bool) -> Iterator[Callable[[], None]]:
+    """Show how many of the runs are done while the block runs; it calls what it is given after each."""
+    console = Console(stderr=True, quiet=quiet)
+    if not console.is_terminal:
+        console.print(f"{what}: {runs} runs ...")
+    with Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        console=console,
+        disable=quiet or not console.is_terminal,
+    ) as bars:
+        yield partial(bars.advance, bars.add_task(what, total=runs))

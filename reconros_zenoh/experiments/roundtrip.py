@@ -26,6 +26,9 @@ if TYPE_CHECKING:
 CLIENTS = ("inverse", "mnist", "sobel", "sort", "hash")
 """In the order in which the paper's Fig. 6 shows them."""
 
+ANSWER_LIMIT_S = 10.0
+"""Longer than the clients' own limit: the modelled stack can take 3 s to repair a large message."""
+
 Clock = Literal["wall", "virtual"]
 
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Self
 from deploy.compose import read_compose
 from deploy.runner import LocalRunner
 from reconros_zenoh.board.control import ask_status
-from reconros_zenoh.experiments.roundtrip import CLIENTS, BoardReport
+from reconros_zenoh.experiments.roundtrip import ANSWER_LIMIT_S, CLIENTS, BoardReport
 from reconros_zenoh.transport.zenoh import ZenohTransport
 
 if TYPE_CHECKING:
@@ -40,6 +40,7 @@ def run_wall(plan: Plan, report: BoardReport, on_progress: Callable[[str, str], 
                 "PROFILE": plan.profile,
                 "MAPPING": str(path),
                 "REQUESTS": str(plan.requests),
+                "LIMIT": str(ANSWER_LIMIT_S),
                 "SEED": str(plan.seed),
                 "GROUP": uuid.uuid4().hex,
                 "OUT": str((plan.folder / mapping).resolve()),

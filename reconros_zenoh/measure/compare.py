@@ -10,10 +10,16 @@ from rich.table import Table
 from rich.text import Text
 
 from reconros_zenoh.measure.reference.zynq7100 import reference_cells
-from reconros_zenoh.measure.statistics import format_error, format_ms, format_speedup, summarise
+from reconros_zenoh.measure.statistics import (
+    format_error,
+    format_ms,
+    format_share,
+    format_speedup,
+    summarise,
+)
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterable, Mapping
 
     from rich.console import Console
 
@@ -35,12 +41,13 @@ MODULO_NOTE = (
 
 
 def experiment_tables(records: Mapping[str, Mapping[str, Record]]) -> dict[str, Any]:
-    """Return `mappings`, `speedup_of_means` and `speedup_of_medians` for `records[mapping][client]`.
+    """Return `mappings`, both speedups and `accuracy` for `records[mapping][client]`.
 
     `mappings.<mapping>.<client>` is the summary with `reference_median_ms` and `median_error` (ours over the
     reference, less one; our times modulo 1 s as the paper's clients logged theirs), None where the real board
-    was not measured. A speedup is all_software over the mapping, None where either has no answer; the two
-    tables are empty if all_software was not run.
+    was not measured. A speedup is all_software over the mapping, None where either has no answer; the
+    tables `speedup_of_means` and `speedup_of_medians` are empty if all_software was not run. `accuracy` is as
+    `accuracy` returns it.
     """
     mappings = {
         mapping: {client: _cell(mapping, client, record) for client, record in clients.items()}
@@ -50,7 +57,47 @@ def experiment_tables(records: Mapping[str, Mapping[str, Record]]) -> dict[str, 
         "mappings": mappings,
         "speedup_of_means": _speedups(mappings, "mean_ms"),
         "speedup_of_medians": _speedups(mappings, "median_ms"),
+        "accuracy": accuracy(mappings),
     }
+
+
+def accuracy(mappings: Mapping[str, Mapping[str, Mapping[str, Any]]]) -> dict[str, Any]:
+    """Return how close the medians of the cells `mappings[mapping][client]` are to the real board's.
+
+    Over the cells with a `median_error`: how many `cells` there are and how many lie `within_10_percent`, the
+    `worst` (`mapping`, `client`, `error`), the `mean_absolute_error` and `mean_absolute_error_without_hash`
+    (the hash client logs the period of a timer, which is easy to meet). What has no cell is None.
+    """
+    errors = {
+        (mapping, client): cell["median_error"]
+        for mapping, clients in mappings.items()
+        for client, cell in clients.items()
+        if cell["median_error"] is not None
+    }
+    worst = max(errors, key=lambda key: abs(errors[key]), default=None)
+    return {
+        "cells": len(errors),
+        "within_10_percent": sum(abs(error) <= GOOD_ERROR for error in errors.values()),
+        "worst": worst and {"mapping": worst[0], "client": worst[1], "error": errors[worst]},
+        "mean_absolute_error": _mean_absolute(errors.values()),
+        "mean_absolute_error_without_hash": _mean_absolute(
+            error for (_, client), error in errors.items() if client != "hash"
+        ),
+    }
+
+
+def accuracy_sentence(accuracy: Mapping[str, Any]) -> str:
+    """Return the accuracy in words."""
+    if not accuracy["cells"]:
+        return "accuracy: none of these mappings and clients was measured on the real board."
+    worst = accuracy["worst"]
+    without_hash = accuracy["mean_absolute_error_without_hash"]
+    return (
+        f"accuracy: {accuracy['within_10_percent']} of {accuracy['cells']} medians within 10 % of the real "
+        f"board's; mean absolute error {format_share(accuracy['mean_absolute_error'])}"
+        + (f" ({format_share(without_hash)} without hash)" if without_hash is not None else "")
+        + f"; worst {worst['client']} under {worst['mapping']} ({format_error(worst['error'])})."
+    )
 
 
 def print_tables(console: Console, experiment: Mapping[str, Any]) -> None:
@@ -77,6 +124,7 @@ def print_tables(console: Console, experiment: Mapping[str, Any]) -> None:
             )
         table.add_section()
     console.print(table)
+    console.print(Text(accuracy_sentence(experiment["accuracy"])))
     console.print(
         "Times in ms. board: median on the real Zynq Z7100. error: our median against it. "
         f"speedup: median of all_software over this one. {MODULO_NOTE}",
@@ -103,6 +151,11 @@ def _cell(mapping: str, client: str, record: Record) -> dict[str, float | int | 
         logged_ms = np.median(record.values_ms % LOGGED_MODULO_MS)
         cell["median_error"] = float(logged_ms / reference.median_ms - 1)
     return cell
+
+
+def _mean_absolute(errors: Iterable[float]) -> float | None:
+    sizes = [abs(error) for error in errors]
+    return float(np.mean(sizes)) if sizes else None
 
 
 def _speedups(

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from reconros_zenoh.errors import UsageError
 from reconros_zenoh.measure.compare import MODULO_NOTE, grade
 from reconros_zenoh.measure.findings import findings
+from reconros_zenoh.measure.markup import table
 from reconros_zenoh.measure.plots import grid_figure, inline_svg, spans_figure
 from reconros_zenoh.measure.reference.zynq7100 import (
     PRINTED_SPEEDUPS_OF_MEANS,
@@ -16,14 +17,14 @@ from reconros_zenoh.measure.reference.zynq7100 import (
     reference_notes,
 )
 from reconros_zenoh.measure.statistics import format_error, format_ms, format_speedup
+from reconros_zenoh.measure.trust import trust_section
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Mapping, Sequence
     from pathlib import Path
 
+    from reconros_zenoh.measure.markup import Cell
     from reconros_zenoh.measure.record import Record
-
-Cell = str | tuple[str, str]
 
 _CLOCKS = {
     "virtual": "Virtual time: the board is simulated event by event; the same seed gives the same figures.",
@@ -46,6 +47,7 @@ th, td { padding: 0.25rem 0.7rem; border-bottom: 1px solid var(--line); text-ali
 th { background: var(--soft); font-weight: 600; }
 th:nth-child(-n+2), td:nth-child(-n+2) { text-align: left; }
 .good { color: var(--good); } .fair { color: var(--fair); } .bad { color: var(--bad); }
+.bar { display: inline-block; height: 0.7em; background: var(--grey); vertical-align: baseline; }
 .warning { border-left: 4px solid var(--bad); background: var(--soft); padding: 0.6rem 1rem; }
 """
 
@@ -54,13 +56,15 @@ def write_report(
     path: Path,
     experiments: Sequence[Mapping[str, Any]],
     records: Sequence[Mapping[str, Mapping[str, Record]]],
+    ablation: Mapping[str, Any] | None = None,
 ) -> None:
     """Write one self-contained HTML file about the experiments, `records[i]` belonging to `experiments[i]`.
 
-    Experiments and records are as `load_run` returns them, one per clock. The file is complete or not there:
-    it replaces an older one at the end. Raises UsageError if it cannot be written.
+    Experiments and records are as `load_run` returns them, one per clock. `ablation` has `requests`, `seed`
+    and `variants`, a list of `off` and `accuracy` with the complete model first. The file is complete or
+    not there: it replaces an older one at the end. Raises UsageError if it cannot be written.
     """
-    page = _page(experiments, records)
+    page = _page(experiments, records, ablation)
     partial = path.with_name(path.name + ".partial")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -73,13 +77,16 @@ def write_report(
 
 
 def _page(
-    experiments: Sequence[Mapping[str, Any]], records: Sequence[Mapping[str, Mapping[str, Record]]]
+    experiments: Sequence[Mapping[str, Any]],
+    records: Sequence[Mapping[str, Mapping[str, Record]]],
+    ablation: Mapping[str, Any] | None,
 ) -> str:
     title = "Round-trip times in software and in hardware"
     parts = [f"<h1>{escape(title)}</h1>", _introduction(experiments), "<h2>In short</h2>"]
     parts += [_summary(experiment) for experiment in experiments]
     for experiment, its_records in zip(experiments, records, strict=True):
         parts += _section(experiment, its_records)
+    parts += trust_section(experiments, records, ablation)
     notes = "".join(f"<li>{escape(note)}</li>" for note in reference_notes())
     parts += [f"<h2>The real board's data</h2><ul>{notes}<li>{escape(SWAPPED_COLUMNS)}</li></ul>"]
     parts += ["<h2>How it was made</h2>", *(_origin(experiment) for experiment in experiments)]
@@ -185,7 +192,7 @@ def _medians(experiment: Mapping[str, Any]) -> str:
     head = (
         "client, mapping, answers, lost, wrong, median, real board, error, p5, p25, p75, p95, p99, max, mean"
     )
-    return _table(head.split(", "), rows)
+    return table(head.split(", "), rows)
 
 
 def _speedups(experiment: Mapping[str, Any]) -> str:
@@ -217,7 +224,7 @@ def _speedups(experiment: Mapping[str, Any]) -> str:
         "means, as printed",
     ]
     return (
-        _table(head, rows)
+        table(head, rows)
         + '<p class="small">all_software over the mapping: above 1 the mapping is faster. The means hang on '
         f"few values of the tail; compare the medians. {escape(SWAPPED_COLUMNS)}</p>"
     )
@@ -230,7 +237,7 @@ def _stages(spans: Mapping[str, Mapping[str, Mapping[str, float]]]) -> str:
         [client, mapping, *(format_ms(cell.get(stage)) for stage in stages)]
         for mapping, client, cell in cells
     ]
-    return _table(["client", "mapping", *stages], rows)
+    return table(["client", "mapping", *stages], rows)
 
 
 def _origin(experiment: Mapping[str, Any]) -> str:
@@ -251,13 +258,13 @@ def _name(experiment: Mapping[str, Any]) -> str:
     return f"{experiment['experiment']}, {experiment['clock']} clock"
 
 
-def _by_client(table: Mapping[str, Mapping[str, Any]]) -> list[tuple[str, str, Any]]:
+def _by_client(cells: Mapping[str, Mapping[str, Any]]) -> list[tuple[str, str, Any]]:
     """Return the cells as (mapping, client, cell), with a client's mappings beside each other."""
-    clients = dict.fromkeys(client for row in table.values() for client in row)
+    clients = dict.fromkeys(client for row in cells.values() for client in row)
     return [
         (mapping, client, row[client])
         for client in clients
-        for mapping, row in table.items()
+        for mapping, row in cells.items()
         if client in row
     ]
 
@@ -265,13 +272,3 @@ def _by_client(table: Mapping[str, Mapping[str, Any]]) -> list[tuple[str, str, A
 def _figure(svg: str, label: str, caption: str) -> str:
     drawing = svg.replace("<svg ", f'<svg role="img" aria-label="{escape(label)}" ', 1)
     return f'<figure><div class="wide">{drawing}</div><figcaption>{escape(caption)}</figcaption></figure>'
-
-
-def _table(head: Iterable[str], rows: Iterable[Sequence[Cell]]) -> str:
-    lines = ["<tr>" + "".join(f"<th>{escape(text)}</th>" for text in head) + "</tr>"]
-    for row in rows:
-        cells = [(cell, "") if isinstance(cell, str) else cell for cell in row]
-        lines.append(
-            "<tr>" + "".join(f'<td class="{style}">{escape(text)}</td>' for text, style in cells) + "</tr>"
-        )
-    return '<div class="wide"><table>' + "\n".join(lines) + "</table></div>"

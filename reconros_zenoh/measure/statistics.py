@@ -55,6 +55,11 @@ def format_error(error: float | None) -> str:
     return "-" if error is None else f"{error:+.1%}".replace("%", " %")
 
 
+def format_share(share: float | None) -> str:
+    """Return the share as a percentage, `-` for None."""
+    return "-" if share is None else f"{share:.1%}".replace("%", " %")
+
+
 def format_speedup(speedup: float | None) -> str:
     """Return the speedup with two decimals, `-` for None."""
     return "-" if speedup is None else f"{speedup:.2f}"

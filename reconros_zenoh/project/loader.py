@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 from reconros_zenoh.board.bitstream import Bitstream
@@ -51,7 +52,11 @@ class Project:
         )
 
     def types(self) -> TypeRegistry:
-        """Return a registry that knows the project's interfaces."""
+        """Return the registry that knows the project's interfaces, the same one each time."""
+        return self._types
+
+    @cached_property
+    def _types(self) -> TypeRegistry:
         registry = TypeRegistry()
         for name, text in self.interfaces.texts.items():
             (registry.add_service if "/srv/" in name else registry.add_message)(name, text)

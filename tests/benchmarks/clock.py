@@ -1,4 +1,4 @@
-"""How late the wall-clock loop of a board is under the demo's load: five clients in closed loops, all_hardware.
+"""How late the wall-clock loop of a board is under the demo's load: five clients, all_hardware.
 
 The rival is SimPy's own RealtimeEnvironment with a timer alone on the idle machine: the best case of a loop
 that sleeps until each event.

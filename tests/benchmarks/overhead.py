@@ -16,6 +16,7 @@ import sys
 import threading
 import time
 from contextlib import ExitStack, contextmanager
+from functools import partial
 from pathlib import Path
 from queue import SimpleQueue
 from typing import TYPE_CHECKING, Any
@@ -179,7 +180,8 @@ def measure(router: str, rival: subprocess.Popen[str]) -> list[dict[str, Any]]:
                 rival.stdin.write(f"{size} {times}\n")
                 rival.stdin.flush()
                 raw_us.append(float(rival.stdout.readline()))
-                ours_us.append(statistics.median(ping(lambda: publisher.publish(message), answers, times)))
+                send = partial(publisher.publish, message)
+                ours_us.append(statistics.median(ping(send, answers, times)))
             # The first round only warms up.
             ratios = [ours / raw for ours, raw in zip(ours_us[1:], raw_us[1:], strict=True)]
             rows.append(

@@ -53,14 +53,22 @@ def test_more_threads_than_cores_share_them(environment: VirtualEnvironment) -> 
 
 def test_the_communication_stack_comes_before_threads(environment: VirtualEnvironment) -> None:
     cpu = Cpu(environment, 1)
-    assert ends(environment, [cpu.run(100), cpu.run_stack(30, 1)]) == [130, 30]
+    assert ends(environment, [cpu.run(100), cpu.run_stack(30, share=1)]) == [130, 30]
+
+
+def test_the_communication_stack_leaves_what_is_beyond_its_share_to_threads(
+    environment: VirtualEnvironment,
+) -> None:
+    cpu = Cpu(environment, 1)
+    # 40 % of the core for 100 ns; the thread gets 60 ns of them.
+    assert ends(environment, [cpu.run(100), cpu.run_stack(40, share=0.4)]) == [140, 100]
 
 
 def test_a_stalled_stack_leaves_the_cores_to_threads(environment: VirtualEnvironment) -> None:
     cpu = Cpu(environment, 1)
     cpu.stall_stack()
     environment.call_later(500, cpu.resume_stack)
-    assert ends(environment, [cpu.run(100), cpu.run_stack(30, 1)]) == [100, 530]
+    assert ends(environment, [cpu.run(100), cpu.run_stack(30, share=1)]) == [100, 530]
 
 
 def test_a_transfer_takes_its_bytes_over_the_bandwidth(environment: VirtualEnvironment) -> None:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from reconros_zenoh.board.bitstream_fit import BitstreamFit, frames
 from reconros_zenoh.board.profile import Profile, profile_names, read_profile
 from reconros_zenoh.errors import FileError, UsageError
 
@@ -59,13 +60,25 @@ def test_the_reference_executor_polls_once_in_a_millisecond_and_in_ten() -> None
     assert (model.executor.hardware_poll.ns, model.executor.software_poll.ns) == (1_040_000, 10_000_000)
 
 
-def test_a_slot_of_another_size_takes_the_bytes_per_lut_of_the_listed_ones() -> None:
+def test_a_slot_that_is_listed_takes_what_the_profile_says() -> None:
     profile = read_profile("miniitx-zynq7100")
     assert profile.bitstream_size(20800, 160, 60) == 2838976
-    per_lut = (2838976 + 5285728 + 4883328) / (20800 + 41600 + 40800)
-    assert profile.bitstream_size(20800, 160, 61) == round(20800 * per_lut)
-    assert profile.bitstream_size(10000, 0, 0) == round(10000 * per_lut)
+    assert profile.bitstream_size(41600, 320, 120) == 5285728
     assert read_profile("native").bitstream_size(20800, 160, 60) == 4096
+
+
+def test_the_size_of_another_slot_is_estimated_from_the_listed_ones() -> None:
+    profile = read_profile("miniitx-zynq7100")
+    listed = BitstreamFit.of(
+        [
+            (frames(20800, 160, 60), 2838976),
+            (frames(41600, 320, 120), 5285728),
+            (frames(40800, 280, 100), 4883328),
+        ]
+    )
+    assert profile.bitstream_size(20800, 160, 61) == listed.size(frames(20800, 160, 61))
+    assert profile.bitstream_size(30000, 200, 80) == listed.size(frames(30000, 200, 80))
+    assert 2838976 < profile.bitstream_size(30000, 200, 80) < 4883328
 
 
 def test_a_profile_of_ones_own(tmp_path: Path) -> None:
@@ -106,8 +119,8 @@ MISTAKES = {
         "model.osif.call",
     ),
     "negative": (
-        "hardware_poll = { value = 1.04",
-        "hardware_poll = { value = -1.04",
+        "hardware_poll = { value = ",
+        "hardware_poll = { value = -",
         "hardware_poll =",
         "model.executor.hardware_poll.value: Input should be greater than or equal to 0",
     ),
@@ -125,7 +138,12 @@ MISTAKES = {
         "model.cores.count.value: Input should be greater than or equal to 1",
     ),
     "half a core": ("count = { value = 2", "count = { value = 1.5", "count = {", "model.cores.count.value"),
-    "more than all": ("value = 0.17", "value = 1.7", "nack_probability =", "less than or equal to 1"),
+    "more than all": (
+        "nack_probability = { value = 0",
+        "nack_probability = { value = 7",
+        "nack_probability =",
+        "less than or equal to 1",
+    ),
     "unknown unit": (
         'value = 666, unit = "MHz"',
         'value = 666, unit = "rpm"',
@@ -139,10 +157,10 @@ MISTAKES = {
         "model.cores.clock.unit: Field required",
     ),
     "unknown basis": (
-        'per_byte = { value = 8.5, unit = "ns/B", basis = "calibrated"',
-        'per_byte = { value = 8.5, unit = "ns/B", basis = "guessed"',
-        "per_byte = { value = 8.5",
-        "model.link.per_byte.basis: Input should be 'published', 'calibrated' or 'assumed'",
+        'value = 666, unit = "MHz", basis = "published"',
+        'value = 666, unit = "MHz", basis = "guessed"',
+        "clock = { value = 666",
+        "model.cores.clock.basis: Input should be 'published', 'calibrated' or 'assumed'",
     ),
     "unknown key": (
         "stalled_by_reconfiguration = true",

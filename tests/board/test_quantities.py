@@ -15,6 +15,7 @@ from reconros_zenoh.board.quantity import (
     Fraction,
     Frequency,
     Quantity,
+    Share,
     Size,
 )
 
@@ -67,6 +68,8 @@ def test_fractions_and_counts_have_the_unit_one() -> None:
         (Size, 0, "B"),
         (Fraction, 0, "1"),
         (Fraction, 1, "1"),
+        (Share, 0.001, "1"),
+        (Share, 1, "1"),
         (Count, 1, "1"),
         (Bandwidth, 0.001, "B/s"),
     ],
@@ -87,6 +90,8 @@ def test_the_smallest_and_the_largest(kind: type[Quantity], value: float, unit: 
         (Frequency, 0, "MHz"),
         (Fraction, 1.01, "1"),
         (Fraction, -0.01, "1"),
+        (Share, 0, "1"),
+        (Share, 1.01, "1"),
         (Count, 0, "1"),
         (Count, 1.5, "1"),
     ],

@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from small_board import desktop, small_board, small_profile, types
+from small_board import desktop, small_board, small_profile, stages, start, types
 
 from reconros_zenoh.board.endpoints import ServiceSource, SubscriptionSource, TimerSource, TopicWriter, Writer
 from reconros_zenoh.board.executor import Executor
@@ -78,6 +78,16 @@ def test_what_waited_behind_another_message_has_crossed_the_link_meanwhile() -> 
     board.environment.run(until=10_000)
     # The link is crossed once, then the stack takes 100 ns for each.
     assert board.log == [(170, 1), (270, 2), (370, 3)]
+
+
+def test_what_waited_behind_another_message_was_not_in_the_real_network_meanwhile() -> None:
+    """So what the board sends has the whole link before it, see `DdsStack`."""
+    board = Subscriber(small_profile({"a": (1, 0)}, dds_message_ns=100, link_ns=70), depth=10)
+    board.publish_at(0, *range(9))
+    board.environment.run(until=10_000)
+    timeline = Timeline(board.environment, board.environment.now)
+    board.environment.run(until=start(board.environment, board.board.dds.send(0, timeline)))
+    assert stages(timeline) == {"dds": 100, "transport": 70}
 
 
 def test_messages_come_in_the_order_in_which_they_were_sent() -> None:

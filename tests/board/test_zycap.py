@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from small_board import BITSTREAM_BYTES, small_board, small_profile, start
+from small_board import BITSTREAM_BYTES, Log, small_board, small_profile, start
 
 from reconros_zenoh.board.bitstream import Bitstream
 from reconros_zenoh.errors import UsageError
@@ -18,25 +18,17 @@ if TYPE_CHECKING:
 
     from reconros_zenoh.board.board import Board
 
-OFFSET_NS = 70
+OFFSET_NS = 110
 RECOVERY_NS = 40
 WRITE_NS = BITSTREAM_BYTES // 2 + OFFSET_NS  # t_rc = S / B + t_offset at two bytes per nanosecond
 
 
-def board_with_slots(slots: int, *, stalled: bool = False, cores: int = 1, dds_message_ns: int = 0) -> Board:
-    return small_board(
-        small_profile(
-            icap_offset_ns=OFFSET_NS,
-            recovery_ns=RECOVERY_NS,
-            stalled=stalled,
-            cores=cores,
-            dds_message_ns=dds_message_ns,
-        ),
-        slots,
-    )
+def board_with_slots(slots: int, *, stalled: bool = False) -> Board:
+    profile = small_profile(icap_offset_ns=OFFSET_NS, recovery_ns=RECOVERY_NS, stalled=stalled, cores=1)
+    return small_board(profile, slots)
 
 
-def write(board: Board, log: list[tuple[int, str]], slot: int, callback: str) -> simpy.Event:
+def write(board: Board, log: Log, slot: int, callback: str) -> simpy.Event:
     def run() -> Steps:
         yield from board.zycap.write_bitstream(board.slots[slot], Bitstream(slot, callback, BITSTREAM_BYTES))
         log.append((board.environment.now, f"slot {slot} holds {callback}"))
@@ -44,49 +36,58 @@ def write(board: Board, log: list[tuple[int, str]], slot: int, callback: str) ->
     return start(board.environment, run())
 
 
+def work_from(board: Board, log: Log, time_ns: int, name: str, work: Steps) -> None:
+    def run() -> Steps:
+        yield board.environment.timeout(time_ns)
+        yield from work
+        log.append((board.environment.now, name))
+
+    start(board.environment, run())
+
+
 def test_a_write_takes_the_size_over_the_bandwidth_and_the_offset() -> None:
     board = board_with_slots(1)
-    log: list[tuple[int, str]] = []
+    log: Log = []
     write(board, log, 0, "sobel")
     board.environment.run()
-    assert log == [(1000 + 70, "slot 0 holds sobel")]
+    assert log == [(1000 + 110, "slot 0 holds sobel")]
     assert board.slots[0].holds == Bitstream(0, "sobel", BITSTREAM_BYTES)
     assert board.slots[0].reconfigurations == 1
-    assert board.slots[0].reconfiguration_ns == 1070
+    assert board.slots[0].reconfiguration_ns == 1110
 
 
 def test_the_bandwidth_of_the_profile_counts() -> None:
     zycap = board_with_slots(1).zycap
-    assert [zycap.reconfiguration_ns(size) for size in (0, 10, 2_838_976)] == [70, 75, 1_419_558]
+    assert [zycap.reconfiguration_ns(size) for size in (0, 10, 2_838_976)] == [110, 115, 1_419_598]
 
 
 def test_two_slots_reconfigured_at_once_queue_for_the_one_icap() -> None:
     board = board_with_slots(3)
     board.environment.run(until=400)
-    log: list[tuple[int, str]] = []
+    log: Log = []
     for slot in (1, 0, 2):
         write(board, log, slot, "sobel")
     board.environment.run()
     assert log == [
-        (400 + 1070, "slot 1 holds sobel"),
-        (400 + 2140, "slot 0 holds sobel"),
-        (400 + 3210, "slot 2 holds sobel"),
+        (400 + 1110, "slot 1 holds sobel"),
+        (400 + 2220, "slot 0 holds sobel"),
+        (400 + 3330, "slot 2 holds sobel"),
     ]
     # What a slot waited counts as reconfiguration, too.
-    assert [board.slots[slot].reconfiguration_ns for slot in (0, 1, 2)] == [2140, 1070, 3210]
+    assert [board.slots[slot].reconfiguration_ns for slot in (0, 1, 2)] == [2220, 1110, 3330]
 
 
 def test_a_slot_that_holds_the_bitstream_is_not_written_even_while_the_icap_is_busy() -> None:
     board = board_with_slots(2)
-    log: list[tuple[int, str]] = []
+    log: Log = []
     board.environment.run(until=write(board, log, 0, "sobel"))
     write(board, log, 1, "mnist")
     write(board, log, 0, "sobel")
     board.environment.run()
     assert log == [
-        (1070, "slot 0 holds sobel"),
-        (1070, "slot 0 holds sobel"),
-        (2140, "slot 1 holds mnist"),
+        (1110, "slot 0 holds sobel"),
+        (1110, "slot 0 holds sobel"),
+        (2220, "slot 1 holds mnist"),
     ]
     assert board.slots[0].reconfigurations == 1
 
@@ -119,53 +120,63 @@ def test_a_slot_is_written_if_and_only_if_it_does_not_hold_that_bitstream(
     assert {slot: board.slots[slot].reconfigurations for slot in board.slots} == changes
 
 
-@pytest.mark.parametrize(
-    ("stalled", "expected"),
-    [
-        (
-            True,
-            [(700, "thread"), (WRITE_NS, "slot 0 holds sobel"), (WRITE_NS + RECOVERY_NS + 100, "message")],
-        ),
-        (False, [(200, "message"), (800, "thread"), (WRITE_NS, "slot 0 holds sobel")]),
-    ],
-    ids=["stalled", "not stalled"],
-)
-def test_the_communication_stack_stalls_during_a_write_if_the_profile_says_so(
-    stalled: bool, expected: list[tuple[int, str]]
-) -> None:
-    board = board_with_slots(1, stalled=stalled)
-    log: list[tuple[int, str]] = []
-
-    def work(name: str, run: Steps) -> Steps:
-        yield board.environment.timeout(100)
-        yield from run
-        log.append((board.environment.now, name))
-
+def test_the_communication_stack_stalls_during_a_write_and_until_it_has_recovered() -> None:
+    board = board_with_slots(1, stalled=True)
+    log: Log = []
     write(board, log, 0, "sobel")
-    start(board.environment, work("message", board.cpu.run_stack(100, 1)))
-    start(board.environment, work("thread", board.cpu.run(600)))
-    board.environment.run()
-    assert sorted(log) == sorted(expected)
-
-
-def test_the_stack_does_not_recover_between_two_writes_in_a_row() -> None:
-    board = board_with_slots(2, stalled=True)
-    log: list[tuple[int, str]] = []
-
-    def message() -> Steps:
-        yield from board.cpu.run_stack(60, 1)
-        log.append((board.environment.now, "message"))
-
-    write(board, log, 0, "sobel")
-    write(board, log, 1, "sobel")
-    board.environment.run(until=1)
-    start(board.environment, message())
+    work_from(board, log, 100, "message", board.cpu.run_stack(100, share=1))
+    work_from(board, log, 100, "thread", board.cpu.run(600))
     board.environment.run()
     assert log == [
-        (WRITE_NS, "slot 0 holds sobel"),
-        (2 * WRITE_NS, "slot 1 holds sobel"),
-        (2 * WRITE_NS + RECOVERY_NS + 60, "message"),
+        (700, "thread"),
+        (1110, "slot 0 holds sobel"),  # the slot need not wait for the stack
+        (1110 + 40 + 100, "message"),
     ]
+
+
+def test_a_message_that_is_in_work_when_a_write_begins_waits_too() -> None:
+    board = board_with_slots(1, stalled=True)
+    log: Log = []
+    work_from(board, log, 0, "message", board.cpu.run_stack(100, share=1))
+    board.environment.run(until=70)
+    write(board, log, 0, "sobel")
+    board.environment.run()
+    assert log == [(70 + 1110, "slot 0 holds sobel"), (70 + 1110 + 40 + 30, "message")]
+
+
+def test_the_communication_stack_goes_on_during_a_write_if_the_profile_says_so() -> None:
+    board = board_with_slots(1, stalled=False)
+    log: Log = []
+    write(board, log, 0, "sobel")
+    work_from(board, log, 100, "message", board.cpu.run_stack(100, share=1))
+    work_from(board, log, 100, "thread", board.cpu.run(600))
+    board.environment.run()
+    assert log == [(200, "message"), (800, "thread"), (1110, "slot 0 holds sobel")]
+
+
+def test_the_stack_stalls_over_two_writes_until_it_has_recovered_from_the_second() -> None:
+    board = board_with_slots(2, stalled=True)
+    log: Log = []
+    write(board, log, 0, "sobel")
+    write(board, log, 1, "sobel")
+    work_from(board, log, 1, "message", board.cpu.run_stack(60, share=1))
+    board.environment.run()
+    assert log == [
+        (1110, "slot 0 holds sobel"),
+        (2220, "slot 1 holds sobel"),
+        (2220 + 40 + 60, "message"),
+    ]
+
+
+def test_a_write_that_is_skipped_stalls_nothing() -> None:
+    board = board_with_slots(1, stalled=True)
+    log: Log = []
+    board.environment.run(until=write(board, [], 0, "sobel"))
+    board.environment.run(until=2000)
+    write(board, log, 0, "sobel")
+    work_from(board, log, 0, "message", board.cpu.run_stack(60, share=1))
+    board.environment.run()
+    assert log == [(2000, "slot 0 holds sobel"), (2060, "message")]
 
 
 def test_prefetched_bitstreams_are_at_hand_until_deinit() -> None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from reconros_zenoh.applications.roundtrip.callbacks.sobel import check_image
-from reconros_zenoh.applications.roundtrip.kernels.mnist import SIDE, Classifier
+from reconros_zenoh.applications.roundtrip.kernels.mnist import SIDE, shipped_classifier
 
 if TYPE_CHECKING:
     from collections.abc import Generator
@@ -22,7 +22,7 @@ class Mnist:
 
     def __init__(self, publisher: TopicWriter) -> None:
         self._publisher = publisher
-        self._classify = Classifier().classify
+        self._classify = shipped_classifier().classify
 
     def check(self, message: Any) -> None:
         """Raise BadMessageError for an image of another size or encoding."""

@@ -6,6 +6,7 @@ training/train.py and run by OpenCV.
 
 from __future__ import annotations
 
+import functools
 import threading
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -52,6 +53,12 @@ class Classifier:
             self._net.setInput(blob)
             scores = self._net.forward()
         return int(np.argmax(scores))
+
+
+@functools.cache
+def shipped_classifier() -> Classifier:
+    """Return the shipped network, loaded once for all boards and clients of a process."""
+    return Classifier()
 
 
 def accuracy(images: NDArray[np.uint8], labels: NDArray[np.uint8], model: Path = MODEL) -> float:

@@ -1,0 +1,194 @@
+"""`reconros calibrate`: a board profile from measurements of that board."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.box import SIMPLE_HEAD
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from reconros_zenoh.board.profile import read_profile
+from reconros_zenoh.cli.progress import run_bar
+from reconros_zenoh.errors import UsageError
+from reconros_zenoh.experiments.calibration import (
+    Calibration,
+    FittedCell,
+    calibrated_constants,
+    planned_evaluations,
+)
+from reconros_zenoh.experiments.calibration import calibrate as fit
+from reconros_zenoh.experiments.measured import read_measurements
+from reconros_zenoh.experiments.profile_file import profile_file, replacing, with_values
+from reconros_zenoh.experiments.roundtrip import application_folder
+from reconros_zenoh.measure.compare import grade
+from reconros_zenoh.measure.statistics import format_error, format_ms
+from reconros_zenoh.project.loader import load_project
+
+
+def calibrate(
+    profile: Annotated[str, typer.Option(metavar="NAME|FILE", help="The profile to start from.")],
+    data: Annotated[
+        list[Path],
+        typer.Option(
+            metavar="DIR...",
+            help="Measured round trips: DIR/<mapping>/<client>.csv, times in ms. May be repeated.",
+        ),
+    ],
+    out: Annotated[Path, typer.Option(metavar="FILE", help="The profile to write.")],
+    more_data: Annotated[
+        list[Path] | None, typer.Argument(metavar="[DIR...]", help="More of --data.", show_default=False)
+    ] = None,
+    mapping: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME=NAME|FILE",
+            help="The mapping of the folder NAME, if that is no mapping's name and has no NAME.toml beside "
+            "it. May be repeated.",
+            show_default=False,
+        ),
+    ] = None,
+    trim: Annotated[
+        bool,
+        typer.Option(
+            "--trim",
+            help="Leave out each file's first and last value: warm-up and total in the paper's logs.",
+        ),
+    ] = False,
+    evaluations: Annotated[
+        int, typer.Option(min=2, help="Evaluations of the search, each one run per mapping.")
+    ] = 300,
+    requests: Annotated[
+        int, typer.Option(min=20, help="Requests per client and run; more lower the noise.")
+    ] = 300,
+    seed: Annotated[int, typer.Option(help="Seed of requests and model.")] = 0,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
+) -> None:
+    """Fit the calibrated constants of a profile to measured round trips; all others are held."""
+    start = read_profile(profile)
+    source = profile_file(profile)
+    constants = calibrated_constants(start)
+    project = load_project(application_folder())
+    measured = read_measurements([*data, *(more_data or [])], project, _assignments(mapping or []), trim=trim)
+    with replacing(out) as file:
+        total = planned_evaluations(constants, evaluations)
+        with run_bar(f"fitting {len(constants)} constants", total, quiet=as_json) as advance:
+            found = fit(start, measured, evaluations, requests, seed, advance)
+        values = {
+            each.constant.place: each.value for each in found.constants if each.value != each.constant.value
+        }
+        file.write_text(with_values(source, values, found.profile), encoding="utf-8")
+    if as_json:
+        print(json.dumps(_object(found, out, requests, seed)))
+    else:
+        _print(Console(), found)
+        print(f"the fitted profile is {out}")
+
+
+def _assignments(given: list[str]) -> dict[str, str]:
+    assigned: dict[str, str] = {}
+    for text in given:
+        name, equals, mapping = text.partition("=")
+        if not (name and equals and mapping):
+            raise UsageError(f"--mapping {text}: write NAME=MAPPING, the folder's name and its mapping.")
+        assigned[name] = mapping
+    return assigned
+
+
+def _object(found: Calibration, out: Path, requests: int, seed: int) -> dict[str, Any]:
+    return {
+        "profile": str(out),
+        "requests": requests,
+        "seed": seed,
+        "evaluations": found.evaluations,
+        "objective": {"before": found.before, "after": found.after, "noise": found.noise},
+        "cells": [
+            {
+                "mapping": cell.mapping,
+                "client": cell.client,
+                **{
+                    side: dict(zip(("p25_ms", "median_ms", "p75_ms"), quartiles, strict=True))
+                    for side, quartiles in (
+                        ("measured", cell.measured_ms),
+                        ("before", cell.before_ms),
+                        ("after", cell.after_ms),
+                    )
+                },
+            }
+            for cell in found.cells
+        ],
+        "constants": [
+            {
+                "name": each.constant.name,
+                "unit": each.constant.unit,
+                "old": each.constant.value,
+                "new": each.value,
+                "sensitivity": each.sensitivity,
+                "determined": each.determined,
+            }
+            for each in found.constants
+        ],
+    }
+
+
+def _print(console: Console, found: Calibration) -> None:
+    cells = _table("Medians in ms, and the errors of p25, median and p75 after the fit", 2)
+    for column in ("mapping", "client", "measured", "before", "after", "p25", "median", "p75"):
+        cells.add_column(
+            column, overflow="fold", justify="left" if column in {"mapping", "client"} else "right"
+        )
+    for cell in found.cells:
+        cells.add_row(
+            Text(cell.mapping),
+            cell.client,
+            *(format_ms(side[1]) for side in (cell.measured_ms, cell.before_ms, cell.after_ms)),
+            *_errors(cell),
+        )
+    console.print(cells)
+    constants = _table("Constants, and how much the objective changes when one is 20 % more or less", 1)
+    for column in ("constant", "unit", "old", "new", "sensitivity", ""):
+        constants.add_column(column, justify="left" if column in {"constant", "unit", ""} else "right")
+    for each in found.constants:
+        constants.add_row(
+            each.constant.name,
+            each.constant.unit,
+            f"{each.constant.value:.4g}",
+            f"{each.value:.4g}",
+            f"{each.sensitivity:.3f}",
+            "" if each.determined else Text("not determined", style="yellow"),
+        )
+    console.print(constants)
+    console.print(
+        f"objective {found.before:.3f} before, {found.after:.3f} after; from seed to seed it differs by "
+        f"{found.noise:.3f} (standard deviation). {found.evaluations} evaluations.",
+        highlight=False,
+    )
+    if vague := [each.constant.name for each in found.constants if not each.determined]:
+        console.print(
+            Text(
+                f"warning: the data do not determine {', '.join(vague)}: 20 % more or less changes the "
+                "objective by less than the seed does. More --requests or other mappings may tell; otherwise "
+                "mark them assumed.",
+                style="yellow",
+            )
+        )
+
+
+def _errors(cell: FittedCell) -> list[Text]:
+    errors = [ours / real - 1 for ours, real in zip(cell.after_ms, cell.measured_ms, strict=True)]
+    styles = {"good": "green", "fair": "yellow", "bad": "red"}
+    return [Text(format_error(error), style=styles[grade(error)]) for error in errors]
+
+
+def _table(title: str, padding: int) -> Table:
+    return Table(
+        title=Text(title, style="bold"),
+        title_justify="left",
+        box=SIMPLE_HEAD,
+        padding=(0, padding - 1, 0, 0),
+        show_edge=False,
+    )

@@ -1,0 +1,144 @@
+"""The commands of a deployment's services, read as what they would run."""
+
+from __future__ import annotations
+
+import functools
+from pathlib import Path, PurePath
+from typing import TYPE_CHECKING, Any
+
+import typer
+from typer.main import get_command
+
+from board_daemon.hosting import BoardOptions
+from deploy.compose import Condition, read_compose
+from deploy.yaml_node import Node
+from host_clients.daemon import ClientOptions
+from reconros_zenoh.board.profile import read_profile
+from reconros_zenoh.cli import daemons
+from reconros_zenoh.errors import FileError, UsageError
+from reconros_zenoh.experiments.deployment import BoardPlan, DeploymentPlan
+from reconros_zenoh.experiments.roundtrip import application_folder
+from reconros_zenoh.project.loader import load_project
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from deploy.compose import Service
+
+_VERBS: dict[str, Callable[..., None]] = {
+    "board": daemons.board,
+    "client": daemons.client,
+    "router": daemons.router,
+}
+
+
+def read_deployment(path: Path, environment: Mapping[str, str]) -> DeploymentPlan:
+    """Return the boards and clients of a Compose file; nothing is started.
+
+    FileError names the service whose command cannot be simulated: another one than `reconros board`, `client`
+    and `router`, options that these would refuse, a profile without modelled times, a client without a board.
+    """
+    services = read_compose(path, environment).services
+    nodes = Node.read(path, environment).mapping()["services"].mapping()
+    projects = functools.cache(load_project)
+    profiles = functools.cache(read_profile)
+    boards: dict[str, BoardPlan] = {}
+    clients: dict[str, ClientOptions] = {}
+    for name, service in services.items():
+        command = nodes[name].mapping()["command"]
+        if Condition.COMPLETED in service.depends_on.values():
+            raise nodes[name].error(
+                "waits for the end of another service, which `simulate` does not know.",
+                "Simulate the services that run side by side in a file of their own.",
+            )
+        verb, given = _parse(service, command)
+        if verb == "board":
+            try:
+                project = projects(given["project"] or application_folder())
+                mapping, profile = project.mapping(given["mapping"]), profiles(given["profile"])
+            except FileError:
+                raise
+            except UsageError as error:
+                raise command.error(f"cannot be run: {error}", "Correct the option.") from None
+            if profile.model is None:
+                raise command.error(
+                    f"takes the profile {given['profile']!r}, which models nothing: nothing would take any "
+                    "virtual time.",
+                    "Give another --profile.",
+                )
+            if given["name"] in [board.options.name for board in boards.values()]:
+                raise command.error(f"names a second board {given['name']!r}.", "Give each a --name.")
+            options = BoardOptions(given["name"], given["domain"], given["seed"], given["bitstreams"])
+            boards[name] = BoardPlan(profile, project, mapping, options)
+        elif verb == "client":
+            clients[name] = ClientOptions(
+                str(given["name"]),
+                given["router"],
+                given["requests"],
+                given["limit"],
+                given["wait"],
+                given["domain"],
+                given["seed"],
+                given["group"],
+                given["members"],
+            )
+    plan = DeploymentPlan(boards, clients)
+    _check_clients(plan, nodes)
+    return plan
+
+
+def _parse(service: Service, command: Node) -> tuple[str, dict[str, Any]]:
+    """Return the verb of the service's command and the values of its options."""
+    program, *words = service.command
+    if PurePath(program).name != "reconros" or not words or words[0] not in _VERBS:
+        raise command.error(
+            f"cannot be simulated: {' '.join(service.command)!r}.",
+            "Simulated are `reconros board`, `reconros client` and `reconros router`; for all else use "
+            "`reconros up`.",
+        )
+    verb, *arguments = words
+    parser = _parser(verb)
+    # An option on the command line wins over a variable: of two values the last one counts.
+    variables = [
+        f"{parameter.opts[0]}={service.environment[parameter.envvar]}"
+        for parameter in parser.params
+        if isinstance(parameter.envvar, str) and service.environment.get(parameter.envvar)
+    ]
+    try:
+        given = parser.main([*variables, *arguments], f"reconros {verb}", standalone_mode=False)
+    except typer.TyperException as error:
+        raise command.error(
+            f"cannot be run: {error.format_message()}", f"See `reconros {verb} --help`."
+        ) from None
+    return verb, given
+
+
+@functools.cache
+def _parser(verb: str) -> Any:
+    """Return the command line of a verb, which gives back its options instead of running it."""
+
+    @functools.wraps(_VERBS[verb])
+    def options(**given: object) -> dict[str, object]:
+        return given
+
+    application = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
+    application.command(add_help_option=False)(options)
+    return get_command(application)
+
+
+def _check_clients(plan: DeploymentPlan, nodes: Mapping[str, Node]) -> None:
+    """Raise FileError for a client that could never begin, and when there is none."""
+    if not plan.clients:
+        raise next(iter(nodes.values())).error("and the others are no clients.", "Add a `reconros client`.")
+    for name, client in plan.clients.items():
+        command = nodes[name].mapping()["command"]
+        if not plan.place(client):
+            raise command.error(
+                f"asks in domain {client.domain}, where no board is.", "Give a board the same --domain."
+            )
+        group = {other.name for other in plan.clients.values() if other.group == client.group}
+        if client.group is not None and len(group) < client.members:
+            raise command.error(
+                f"waits for {client.members} clients of the group {client.group!r}, which has {len(group)}.",
+                "Correct --members or add the clients.",
+            )

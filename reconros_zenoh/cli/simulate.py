@@ -1,0 +1,95 @@
+"""`reconros simulate`: a Compose file in one process in virtual time."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from rich.box import SIMPLE_HEAD
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeElapsedColumn
+from rich.table import Table
+from rich.text import Text
+
+from reconros_zenoh.cli.service_commands import read_deployment
+from reconros_zenoh.experiments.deployment import DeploymentRun, prepare
+from reconros_zenoh.measure.statistics import format_ms
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+
+def simulate(
+    file: Annotated[Path, typer.Option("--file", "-f", help="The Compose file.", show_default=False)],
+    boards: Annotated[
+        int | None,
+        typer.Option(
+            min=1,
+            metavar="N",
+            help="Run N clones of the file's boards and clients, each on a network of its own.",
+            show_default="those of the file",
+        ),
+    ] = None,
+    requests: Annotated[
+        int | None,
+        typer.Option(min=1, help="Requests per client.", show_default="those of the file"),
+    ] = None,
+    seed: Annotated[
+        int | None,
+        typer.Option(help="Seed of all boards and clients.", show_default="those of the file"),
+    ] = None,
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for the records.")] = Path(
+        "results/simulate"
+    ),
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
+) -> None:
+    """Run a deployment, the very file that `up` runs, in one process in virtual time.
+
+    The same seed gives the same records, bit for bit. Exit status 0 only if every answer was right and
+    nothing was lost.
+    """
+    plan = read_deployment(file, os.environ).changed(requests, seed)
+    run = DeploymentRun([plan] if boards is None else [plan.clone(number) for number in range(boards)])
+    prepare(out)
+    with Progress(
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        console=Console(stderr=True),
+        disable=as_json or not sys.stderr.isatty(),
+    ) as progress:
+        task = progress.add_task("", total=run.requests)
+        run.run(lambda: progress.advance(task))
+    run.write_records(out)
+    summaries = run.summaries()
+    if as_json:
+        print(json.dumps({"file": str(file), "simulated_s": run.simulated_ns / 1e9, "boards": summaries}))
+    else:
+        _print_table(Console(), summaries)
+        print(f"{run.simulated_ns / 1e9:.1f} s of virtual time; the records are in {out}")
+    raise typer.Exit(0 if run.all_right() else 1)
+
+
+def _print_table(console: Console, summaries: Mapping[str, Mapping[str, Mapping[str, Any]]]) -> None:
+    table = Table(box=SIMPLE_HEAD, padding=0, show_edge=False)
+    table.add_column("board", overflow="fold")
+    table.add_column("client", overflow="fold")
+    for column in ("n", "lost", "wrong", "median", "p95", "p99"):
+        table.add_column(column, justify="right", no_wrap=True)
+    for board, services in summaries.items():
+        for service, cell in services.items():
+            table.add_row(
+                Text(board),
+                Text(service),
+                str(cell["n"]),
+                Text(str(cell["lost"]), style="red" if cell["lost"] else ""),
+                Text(str(cell["wrong"]), style="red" if cell["wrong"] else ""),
+                *(format_ms(cell[key]) for key in ("median_ms", "p95_ms", "p99_ms")),
+            )
+        table.add_section()
+    console.print(table)
+    console.print("Times in ms.", style="dim")

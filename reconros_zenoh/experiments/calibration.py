@@ -1,0 +1,276 @@
+"""Fitting the calibrated constants of a board profile to measured round trips.
+
+Published and assumed constants are held. The objective is the sum of |log(ours / measured)| over the
+quartiles of all cells (mapping and client). It is found by simulation, so it is neither smooth nor without
+noise: the search uses no derivatives, one seed, and takes a step only if it gains more than the objective
+differs from seed to seed.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from pydantic import BaseModel
+
+from reconros_zenoh.board.quantity import Count, Fraction, Quantity, Share
+from reconros_zenoh.errors import UsageError
+from reconros_zenoh.experiments.measured import quartiles_ms
+from reconros_zenoh.experiments.parallel import ParallelRuns, Run, varied
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Mapping, Sequence
+
+    import numpy.typing as npt
+
+    from reconros_zenoh.board.profile import Profile
+    from reconros_zenoh.experiments.measured import MeasuredMapping
+    from reconros_zenoh.measure.record import Record
+
+NOISE_SEEDS = 5
+"""Seeds from which the noise and the figures before and after are found, the search's own being the first."""
+
+_FIRST_STEP = 0.2
+_LAST_STEP = 0.02
+_SENSITIVITY_STEP = 0.2
+# Where a message is resent with certainty it never arrives.
+_LARGEST_PROBABILITY = 0.9
+# A client that gets no answer at all counts like one whose answers come at its limit.
+_NO_ANSWER_MS = 2000.0
+_LEAST_MS = 1e-3
+
+
+@dataclass(frozen=True, slots=True)
+class Constant:
+    """A calibrated constant: its place in the profile's file, its unit and value, and the most it may be."""
+
+    place: tuple[str, ...]
+    unit: str
+    value: float
+    most: float
+
+    @property
+    def name(self) -> str:
+        """The place as a user writes it, without the table `model`."""
+        return ".".join(self.place[1:])
+
+
+@dataclass(frozen=True, slots=True)
+class FittedConstant:
+    """A constant and what became of it.
+
+    `sensitivity` is the most that the objective changes when the constant is 20 % more or less. Data that
+    change it less than the seed does leave the constant undetermined.
+    """
+
+    constant: Constant
+    value: float
+    sensitivity: float
+    determined: bool
+
+
+@dataclass(frozen=True, slots=True)
+class FittedCell:
+    """A cell's quartiles [ms] as measured and, the mean of all seeds, before and after."""
+
+    mapping: str
+    client: str
+    measured_ms: tuple[float, ...]
+    before_ms: tuple[float, ...]
+    after_ms: tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Calibration:
+    """The fitted profile and how the search went; objective and noise as the module describes them."""
+
+    profile: Profile
+    constants: tuple[FittedConstant, ...]
+    cells: tuple[FittedCell, ...]
+    before: float
+    after: float
+    noise: float
+    evaluations: int
+
+
+class _Evaluation(NamedTuple):
+    """The quartiles of all cells for one set of values and one seed, and the objective."""
+
+    cells: dict[tuple[str, str], npt.NDArray[np.float64]]
+    objective: float
+
+
+def calibrated_constants(profile: Profile) -> list[Constant]:
+    """Return the constants of the profile whose basis is `calibrated`, in the order of its file.
+
+    Those that are 0 are left as they are, because 0 switches a mechanism off; so are whole numbers of things.
+    Raise UsageError when there is none.
+    """
+    constants = list(_constants(profile.model, ("model",)))
+    if not constants:
+        raise UsageError(
+            f'profile {profile.name!r} has no constant to fit. Write basis = "calibrated" beside those that '
+            "the measurements are to determine."
+        )
+    return constants
+
+
+def planned_evaluations(constants: Sequence[Constant], evaluations: int) -> int:
+    """Return how many evaluations a calibration takes at most, `evaluations` of them for the search."""
+    return evaluations + 2 * NOISE_SEEDS + 2 * len(constants)
+
+
+def calibrate(
+    profile: Profile,
+    measured: Sequence[MeasuredMapping],
+    evaluations: int,
+    requests: int,
+    seed: int,
+    on_evaluation: Callable[[], None],
+) -> Calibration:
+    """Return the profile fitted to what was measured; the same arguments give the same result anywhere.
+
+    A pattern search along one constant after the other, in steps of its logarithm: it tries a step up and a
+    step down, doubles the step where that helped and halves it where it did not, and ends after that many
+    `evaluations` or when all steps are below 2 %. `on_evaluation` is called after each evaluation (one run
+    under each measured mapping).
+    """
+    constants = calibrated_constants(profile)
+    seeds = range(seed, seed + NOISE_SEEDS)
+    with ParallelRuns() as parallel:
+
+        def evaluate(points: Sequence[tuple[Sequence[float], int]]) -> list[_Evaluation]:
+            runs = parallel.records(
+                Run(_profile(profile, constants, values), mapping.mapping, requests, of_seed)
+                for values, of_seed in points
+                for mapping in measured
+            )
+            found = []
+            for _ in points:
+                found.append(_compare(measured, {m.name: next(runs) for m in measured}))
+                on_evaluation()
+            return found
+
+        start = [constant.value for constant in constants]
+        before = evaluate([(start, each) for each in seeds])
+        noise = float(np.std([each.objective for each in before], ddof=1))
+        values, best, used = _search(constants, before[0].objective, noise, evaluations, seed, evaluate)
+        after = evaluate([(values, each) for each in seeds])
+        around = evaluate(
+            [
+                (_moved(constants, values, index, factor), seed)
+                for index in range(len(constants))
+                for factor in (1 + _SENSITIVITY_STEP, 1 - _SENSITIVITY_STEP)
+            ]
+        )
+    sensitivities = [
+        max(abs(each.objective - best) for each in around[2 * index : 2 * index + 2])
+        for index in range(len(constants))
+    ]
+    return Calibration(
+        profile=_profile(profile, constants, values),
+        constants=tuple(
+            FittedConstant(constant, value, sensitivity, sensitivity >= noise)
+            for constant, value, sensitivity in zip(constants, values, sensitivities, strict=True)
+        ),
+        cells=tuple(
+            FittedCell(
+                mapping.name,
+                client,
+                tuple(quartiles.tolist()),
+                _mean_quartiles(before, (mapping.name, client)),
+                _mean_quartiles(after, (mapping.name, client)),
+            )
+            for mapping in measured
+            for client, quartiles in mapping.quartiles_ms.items()
+        ),
+        before=float(np.mean([each.objective for each in before])),
+        after=float(np.mean([each.objective for each in after])),
+        noise=noise,
+        evaluations=used + len(before) + len(after) + len(around),
+    )
+
+
+def _search(
+    constants: Sequence[Constant],
+    best: float,
+    noise: float,
+    evaluations: int,
+    seed: int,
+    evaluate: Callable[[Sequence[tuple[Sequence[float], int]]], list[_Evaluation]],
+) -> tuple[list[float], float, int]:
+    """Return the best values found, their objective, and how many evaluations that took."""
+    values = [constant.value for constant in constants]
+    steps = [_FIRST_STEP] * len(constants)
+    used = 0
+    while used + 2 <= evaluations and max(steps) >= _LAST_STEP:
+        for index, step in enumerate(steps):
+            if step < _LAST_STEP or used + 2 > evaluations:
+                continue
+            tried = [_moved(constants, values, index, factor) for factor in (math.exp(step), math.exp(-step))]
+            objectives = [each.objective for each in evaluate([(point, seed) for point in tried])]
+            used += len(tried)
+            least = min(objectives)
+            if least < best - noise:
+                values, best = tried[objectives.index(least)], least
+                steps[index] *= 2
+            else:
+                steps[index] /= 2
+    return values, best, used
+
+
+def _constants(part: object, place: tuple[str, ...]) -> Iterator[Constant]:
+    match part:
+        case Quantity():
+            if part.basis == "calibrated" and part.value > 0 and not isinstance(part, Count):
+                yield Constant(place, part.unit, part.value, _most(part))
+        case BaseModel():
+            for name in type(part).model_fields:
+                yield from _constants(getattr(part, name), (*place, name))
+        case dict():
+            for name, inner in part.items():
+                yield from _constants(inner, (*place, name))
+        case tuple():
+            for index, inner in enumerate(part):
+                yield from _constants(inner, (*place, str(index)))
+
+
+def _most(quantity: Quantity) -> float:
+    match quantity:
+        case Share():
+            return 1.0
+        case Fraction():
+            return max(_LARGEST_PROBABILITY, quantity.value)
+        case _:
+            return math.inf
+
+
+def _moved(constants: Sequence[Constant], values: Sequence[float], index: int, factor: float) -> list[float]:
+    """Return the values with one of them times the factor, with the four digits that the file will show."""
+    moved = list(values)
+    moved[index] = float(f"{min(constants[index].most, values[index] * factor):.4g}")
+    return moved
+
+
+def _profile(profile: Profile, constants: Sequence[Constant], values: Sequence[float]) -> Profile:
+    return varied(profile, {constant.place: value for constant, value in zip(constants, values, strict=True)})
+
+
+def _compare(measured: Sequence[MeasuredMapping], records: Mapping[str, Mapping[str, Record]]) -> _Evaluation:
+    cells = {}
+    objective = 0.0
+    for mapping in measured:
+        for client, real in mapping.quartiles_ms.items():
+            values_ms = records[mapping.name][client].values_ms
+            ours = quartiles_ms(values_ms) if values_ms.size else np.full(real.shape, _NO_ANSWER_MS)
+            cells[mapping.name, client] = ours
+            # A time may be a whole number of seconds, which is 0 modulo 1 s.
+            objective += float(np.abs(np.log(np.maximum(ours, _LEAST_MS) / real)).sum())
+    return _Evaluation(cells, objective)
+
+
+def _mean_quartiles(evaluations: Sequence[_Evaluation], cell: tuple[str, str]) -> tuple[float, ...]:
+    means: npt.NDArray[np.float64] = np.mean([each.cells[cell] for each in evaluations], axis=0)
+    return tuple(means.tolist())

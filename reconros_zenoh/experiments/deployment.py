@@ -1,0 +1,151 @@
+"""A deployment in virtual time: what its services are, clones of it, and what came out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from reconros_zenoh.errors import UsageError
+from reconros_zenoh.experiments.simulation import Simulation
+from reconros_zenoh.measure.record import RecordWriter
+from reconros_zenoh.measure.statistics import summarise
+from reconros_zenoh.ros.types import TypeRegistry
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+    from pathlib import Path
+
+    from board_daemon.hosting import BoardOptions
+    from host_clients.daemon import ClientOptions
+    from reconros_zenoh.board.profile import Profile
+    from reconros_zenoh.measure.record import RoundTrip
+    from reconros_zenoh.project.loader import Project
+    from reconros_zenoh.project.mapping_file import Mapping as CallbackMapping
+
+
+@dataclass(frozen=True, slots=True)
+class BoardPlan:
+    """One board: its kind, what it hosts, and what distinguishes it."""
+
+    profile: Profile
+    project: Project
+    mapping: CallbackMapping
+    options: BoardOptions
+
+
+@dataclass(frozen=True, slots=True)
+class DeploymentPlan:
+    """The boards and the clients of a deployment, each by the name of its service."""
+
+    boards: Mapping[str, BoardPlan]
+    clients: Mapping[str, ClientOptions]
+
+    def changed(self, requests: int | None, seed: int | None) -> DeploymentPlan:
+        """Return the same with another number of requests and another seed, where one is given."""
+        boards = {
+            service: replace(
+                board,
+                options=replace(board.options, seed=board.options.seed if seed is None else seed),
+            )
+            for service, board in self.boards.items()
+        }
+        clients = {
+            service: replace(
+                client,
+                seed=client.seed if seed is None else seed,
+                requests=requests or client.requests,
+            )
+            for service, client in self.clients.items()
+        }
+        return DeploymentPlan(boards, clients)
+
+    def clone(self, number: int) -> DeploymentPlan:
+        """Return the same with `-number` behind the names of the boards.
+
+        What is random on a board follows from its seed and its name, so it differs from clone to clone; the
+        clients send the same inputs in the same order.
+        """
+        boards = {
+            service: replace(board, options=replace(board.options, name=f"{board.options.name}-{number}"))
+            for service, board in self.boards.items()
+        }
+        return replace(self, boards=boards)
+
+    def place(self, client: ClientOptions) -> str:
+        """Return the name of the board in the client's domain; of several, their names joined by `+`."""
+        return "+".join(
+            board.options.name for board in self.boards.values() if board.options.domain == client.domain
+        )
+
+
+class DeploymentRun:
+    """Deployments that run beside each other, each on a network of its own.
+
+    `round_trips` holds those of each client, by the names of board and service.
+    """
+
+    def __init__(self, plans: Sequence[DeploymentPlan]) -> None:
+        self._plans = plans
+        self.requests = sum(client.requests for plan in plans for client in plan.clients.values())
+        self.round_trips: dict[str, dict[str, list[RoundTrip]]] = {}
+        self.simulated_ns = 0
+
+    def run(self, on_round_trip: Callable[[], None]) -> None:
+        """Return when all clients are done; raise UsageError or TransportError when one cannot be."""
+        with Simulation(TypeRegistry()) as simulation:
+            for plan in self._plans:
+                simulation.begin_network()
+                for board in plan.boards.values():
+                    simulation.add_board(board.profile, board.project, board.mapping, board.options)
+                for service, client in plan.clients.items():
+                    trips = self.round_trips.setdefault(plan.place(client), {}).setdefault(service, [])
+
+                    def record(round_trip: RoundTrip, trips: list[RoundTrip] = trips) -> None:
+                        trips.append(round_trip)
+                        on_round_trip()
+
+                    simulation.add_client(client, record)
+            simulation.run()
+            self.simulated_ns = simulation.environment.now
+
+    def all_right(self) -> bool:
+        """Tell whether every answer came and was right."""
+        return all(
+            trip.outcome == "ok"
+            for services in self.round_trips.values()
+            for trips in services.values()
+            for trip in trips
+        )
+
+    def write_records(self, folder: Path) -> None:
+        """Write one record per client, `folder/<board>/<service>.csv`."""
+        for board, services in self.round_trips.items():
+            for service, trips in services.items():
+                with RecordWriter(folder / board / f"{service}.csv") as writer:
+                    for trip in trips:
+                        writer.write(trip)
+
+    def summaries(self) -> dict[str, dict[str, dict[str, Any]]]:
+        """Return what `summarise` says of each client, by board and service."""
+        return {
+            board: {service: _summary(trips) for service, trips in services.items()}
+            for board, services in self.round_trips.items()
+        }
+
+
+def prepare(folder: Path) -> None:
+    """Make the folder of the records; raise UsageError when that fails."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise UsageError(
+            f"{folder} cannot be written ({error.strerror}). Choose another folder with --out."
+        ) from None
+
+
+def _summary(trips: Sequence[RoundTrip]) -> dict[str, Any]:
+    times_ms = np.array([trip.time_ns / 1e6 for trip in trips if trip.time_ns is not None])
+    lost = sum(trip.outcome == "lost" for trip in trips)
+    return summarise(times_ms, lost, sum(trip.outcome == "wrong" for trip in trips))

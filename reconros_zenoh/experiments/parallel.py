@@ -1,0 +1,113 @@
+"""Many runs of the round-trip experiment in virtual time, on all cores of this computer."""
+
+from __future__ import annotations
+
+import os
+import signal
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from multiprocessing import get_context
+from typing import TYPE_CHECKING, NamedTuple, Self
+
+import numpy as np
+
+from board_daemon.hosting import BoardOptions
+from host_clients.daemon import ClientOptions
+from reconros_zenoh.board.profile import Profile
+from reconros_zenoh.errors import ExperimentError
+from reconros_zenoh.experiments.roundtrip import CLIENTS, application_folder
+from reconros_zenoh.experiments.simulation import Simulation
+from reconros_zenoh.measure.record import Record
+from reconros_zenoh.project.loader import load_project
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Mapping
+    from pathlib import Path
+
+    from reconros_zenoh.measure.record import RoundTrip
+
+
+class Run(NamedTuple):
+    """The five clients against a board of this profile under this mapping file."""
+
+    profile: Profile
+    mapping: Path
+    requests: int
+    seed: int
+
+
+class ParallelRuns:
+    """Processes that make runs; what comes out does not depend on how many there are.
+
+    They are started afresh rather than forked, because a process with a progress bar's thread cannot be
+    forked safely.
+    """
+
+    def __enter__(self) -> Self:
+        self._pool = ProcessPoolExecutor(os.cpu_count(), get_context("spawn"), _ignore_interrupt)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._pool.shutdown(cancel_futures=True)
+
+    def records(self, runs: Iterable[Run]) -> Iterator[dict[str, Record]]:
+        """Yield the record of each client, run by run in the given order.
+
+        Raise ExperimentError if a process was ended from outside.
+        """
+        try:
+            yield from self._pool.map(_records, runs)
+        except BrokenProcessPool:
+            raise ExperimentError(
+                "a process of the simulation was ended from outside. Was there memory enough? Run it again."
+            ) from None
+
+
+def varied(profile: Profile, changes: Mapping[tuple[str, ...], float | bool]) -> Profile:
+    """Return the profile with other values at these places of its file, as in ("model", "dds", "jitter").
+
+    A place names a quantity, whose value is replaced, or a switch.
+    """
+    content = profile.model_dump()
+    for place, value in changes.items():
+        *tables, last = place
+        table = content
+        for key in tables:
+            table = table[int(key) if isinstance(table, tuple) else key]
+        if isinstance(table[last], dict):
+            table[last]["value"] = value
+        else:
+            table[last] = value
+    return Profile.model_validate(content)
+
+
+def _ignore_interrupt() -> None:
+    """Leave Ctrl-C to the process that gives the work."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def _records(run: Run) -> dict[str, Record]:
+    project = load_project(application_folder())
+    round_trips: dict[str, list[RoundTrip]] = {client: [] for client in CLIENTS}
+    with Simulation(project.types()) as simulation:
+        simulation.add_board(
+            run.profile, project, project.mapping(str(run.mapping)), BoardOptions(seed=run.seed)
+        )
+        for client in CLIENTS:
+            options = ClientOptions(
+                client, "", run.requests, seed=run.seed, group="roundtrip", members=len(CLIENTS)
+            )
+            simulation.add_client(options, round_trips[client].append)
+        simulation.run()
+    return {client: _record(client, made) for client, made in round_trips.items()}
+
+
+def _record(client: str, round_trips: list[RoundTrip]) -> Record:
+    times_ns = [made.time_ns for made in round_trips if made.time_ns is not None]
+    wrong = sum(made.outcome == "wrong" for made in round_trips)
+    return Record(
+        client,
+        np.array(times_ns, dtype=np.float64) / 1e6,
+        lost=len(round_trips) - len(times_ns),
+        wrong=wrong,
+    )

@@ -1,0 +1,84 @@
+"""Writing a board profile with other values, its comments and order kept."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from contextlib import contextmanager
+from importlib.resources import files
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from pydantic import ValidationError
+
+from reconros_zenoh.board.profile import Profile, profile_names
+from reconros_zenoh.errors import FileError, UsageError
+from reconros_zenoh.toml_file import TomlFile
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+_VALUE = re.compile(r"(\bvalue\s*=\s*)[+-]?[0-9][0-9_.eE+-]*")
+
+
+def profile_file(name_or_file: str) -> TomlFile:
+    """Return the file of a profile, as `read_profile` finds it."""
+    if name_or_file in profile_names():
+        return TomlFile.read(Path(str(files("reconros_zenoh.board") / "profiles" / f"{name_or_file}.toml")))
+    return TomlFile.read(Path(name_or_file))
+
+
+def with_values(source: TomlFile, values: Mapping[tuple[str, ...], float], profile: Profile) -> str:
+    """Return the text of a profile's file with the value of each quantity at these places replaced.
+
+    `profile` is what the text must then stand for. Raise FileError, with the line, for a file that is written
+    in a way in which its values cannot be replaced.
+    """
+    lines = source.text.splitlines(keepends=True)
+    for place, value in values.items():
+        number = source.line([*place, "value"])
+        line = lines[number - 1] if number else ""
+        found = _VALUE.search(line)
+        if number is None or found is None:
+            raise _not_replaceable(source, place)
+        lines[number - 1] = f"{line[: found.start()]}{found[1]}{value:.4g}{line[found.end() :]}"
+    text = "".join(lines)
+    try:
+        if Profile.model_validate(tomllib.loads(text)) == profile:
+            return text
+    except (tomllib.TOMLDecodeError, ValidationError):
+        pass
+    raise _not_replaceable(source, next(iter(values)))
+
+
+@contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """Give a file to write; it becomes `path` if the block ends well, otherwise nothing is left of it.
+
+    Raise UsageError at once if `path` cannot be written, so that no work is lost.
+    """
+    partial = path.with_name(f"{path.name}.partial")
+    try:
+        if path.is_dir():
+            raise UsageError(f"{path} is a folder. Name the file of the new profile.")
+        path.parent.mkdir(parents=True, exist_ok=True)
+        partial.touch()
+    except OSError as error:
+        raise UsageError(f"{path} cannot be written ({error.strerror}). Choose another --out.") from None
+    try:
+        yield partial
+        partial.replace(path)
+    except OSError as error:
+        raise UsageError(f"{path} cannot be written ({error.strerror}). Choose another --out.") from None
+    finally:
+        partial.unlink(missing_ok=True)
+
+
+def _not_replaceable(source: TomlFile, place: tuple[str, ...]) -> FileError:
+    name = ".".join(place)
+    return FileError(
+        source.path,
+        source.line(place),
+        f"the value of {name} cannot be replaced.",
+        f'Write it on one line: {place[-1]} = {{ value = 1, unit = "...", basis = "calibrated" }}.',
+    )

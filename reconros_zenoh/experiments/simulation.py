@@ -1,0 +1,133 @@
+"""Boards and clients in one process in virtual time."""
+
+from __future__ import annotations
+
+import copy
+from contextlib import ExitStack
+from functools import cache
+from itertools import count
+from typing import TYPE_CHECKING, Self
+
+from board_daemon.hosting import HostedBoard
+from host_clients.closed_loop import ClosedLoop
+from host_clients.suite import exchange
+from reconros_zenoh.clock.virtual import VirtualEnvironment, succeed_once
+from reconros_zenoh.errors import TransportError
+from reconros_zenoh.rmw.node import Context
+from reconros_zenoh.transport.memory import tune_malloc
+from reconros_zenoh.transport.simulated import SimulatedNetwork
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    import simpy
+
+    from board_daemon.hosting import BoardOptions
+    from host_clients.daemon import ClientOptions
+    from reconros_zenoh.board.profile import Profile
+    from reconros_zenoh.measure.record import RoundTrip
+    from reconros_zenoh.project.loader import Project
+    from reconros_zenoh.project.mapping_file import Mapping
+    from reconros_zenoh.ros.types import TypeRegistry
+
+
+class Simulation:
+    """Boards and clients in one event loop until all clients are done.
+
+    The same boards and clients, added in the same order, give the same round trips on any machine.
+    What does not change is held once, whatever their number: message types, the requests of clients with one
+    name and seed, and the right answers to them.
+    """
+
+    def __init__(self, types: TypeRegistry) -> None:
+        """`types` are those of the clients."""
+        tune_malloc()
+        self.environment = VirtualEnvironment()
+        self._sessions = count(1)
+        self._types = types
+        self._exchange = cache(exchange)
+        self._loops: list[ClosedLoop] = []
+        self._closing = ExitStack()
+        self.begin_network()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._closing.close()
+
+    def begin_network(self) -> None:
+        """Have what is added from now on hear nothing of what was added before.
+
+        A network of its own and not only a ROS domain, because subscriptions hear their topic in all domains
+        (to count what comes from a foreign one): each message would be refused by every other board.
+        """
+        self._network = SimulatedNetwork(self.environment)
+        self._groups: dict[str, _Group] = {}
+
+    def add_board(
+        self, profile: Profile, project: Project, mapping: Mapping, options: BoardOptions
+    ) -> HostedBoard:
+        """Return a board that serves from the beginning; raise UsageError when it cannot host the project."""
+        transport = self._network.transport(f"{next(self._sessions):x}")
+        board = HostedBoard(self.environment, transport, profile, project, mapping, options)
+        self._closing.callback(board.close)
+        return board
+
+    def add_client(self, options: ClientOptions, on_round_trip: Callable[[RoundTrip], None]) -> None:
+        """Have a client make its round trips; `router` says nothing here."""
+        context = Context(
+            self._network.transport(f"{next(self._sessions):x}"), options.domain, self.environment.clock_ns
+        )
+        start = self.environment.event()
+        loop = ClosedLoop(
+            self.environment,
+            # Each client has endpoints of its own; requests and answers stay those of the one that is copied.
+            copy.copy(self._exchange(options.name, options.seed)),
+            context.node(f"{options.name}_client"),
+            self._types,
+            requests=options.requests,
+            limit_ns=round(options.limit_s * 1e9),
+            start=start,
+            on_round_trip=on_round_trip,
+        )
+        self._loops.append(loop)
+        self.environment.call_later(round(options.wait_s * 1e9), _check_answered, loop, options)
+        if options.group is None:
+            start.succeed()
+        else:
+            group = self._groups.setdefault(options.group, _Group())
+            group.join(options, loop, start)
+
+    def run(self) -> None:
+        """Return when all clients are done; raise TransportError when one is never answered."""
+        self.environment.run(until=self.environment.all_of([loop.done for loop in self._loops]))
+
+
+class _Group:
+    """Clients that begin together: each once as many of them are warm as it was told."""
+
+    def __init__(self) -> None:
+        self._warm: set[str] = set()
+        self._waiting: list[tuple[int, simpy.Event]] = []
+
+    def join(self, options: ClientOptions, loop: ClosedLoop, start: simpy.Event) -> None:
+        """Let `start` happen when its time has come."""
+        self._waiting.append((options.members, start))
+
+        def arrive(_: simpy.Event) -> None:
+            self._warm.add(options.name)
+            for members, waiting in self._waiting:
+                if len(self._warm) >= members:
+                    succeed_once(waiting)
+
+        assert loop.warm.callbacks is not None
+        loop.warm.callbacks.append(arrive)
+
+
+def _check_answered(loop: ClosedLoop, options: ClientOptions) -> None:
+    if not loop.warm.triggered:
+        raise TransportError(
+            f"no board answered the {options.name} client in domain {options.domain} within "
+            f"{options.wait_s:g} s of virtual time. Give it a board that serves its topics in its domain."
+        )
