@@ -48,6 +48,7 @@ class ClosedLoop:
         self._on_round_trip = on_round_trip
         self._matched = environment.event()
         self._arrival: simpy.Event | None = None
+        self._wait = 0
         self._last_arrival_ns = 0
         self._lost: list[int] = []
         self.warm = environment.event()
@@ -87,9 +88,11 @@ class ClosedLoop:
 
     def _next_arrival(self, deadline_ns: int) -> Generator[simpy.Event, Any, tuple[int, Any] | None]:
         """Return when the next answer arrived and the answer, or None at the deadline."""
-        event = self._arrival = self._environment.event()
-        self._environment.call_later(max(0, deadline_ns - self._environment.now), self._arrived, event, None)
-        arrival: tuple[int, Any] | None = yield event
+        self._wait += 1
+        self._arrival = self._environment.event()
+        # It knows the wait by its number: the event would keep the answer in memory until the deadline.
+        self._environment.call_later(max(0, deadline_ns - self._environment.now), self._expire, self._wait)
+        arrival: tuple[int, Any] | None = yield self._arrival
         return arrival
 
     def _match(self, matching: bool) -> None:
@@ -100,10 +103,15 @@ class ClosedLoop:
     def _arrive(self, message: object) -> None:
         """Note, on any thread, that an answer has come."""
         arrived_ns = self._environment.clock_ns()
-        self._environment.post(lambda: self._arrived(self._arrival, (arrived_ns, message)))
+        self._environment.post(self._arrived, (arrived_ns, message))
 
-    def _arrived(self, event: simpy.Event | None, arrival: tuple[int, object] | None) -> None:
-        """End the wait that `event` stands for, unless it has ended."""
-        if event is not None and event is self._arrival:
-            self._arrival = None
+    def _expire(self, wait: int) -> None:
+        """End the wait of that number, unless it has ended."""
+        if wait == self._wait:
+            self._arrived(None)
+
+    def _arrived(self, arrival: tuple[int, object] | None) -> None:
+        """End the present wait, if there is one."""
+        event, self._arrival = self._arrival, None
+        if event is not None:
             event.succeed(arrival)

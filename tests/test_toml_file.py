@@ -69,6 +69,11 @@ def test_the_line_of_a_key(path: Path, key: tuple[str, ...], place: str) -> None
     assert "\n".join(TEXT.splitlines()[line - 1 :]).startswith(place)
 
 
+def test_the_first_line(path: Path) -> None:
+    path.write_text("a = 1\n")
+    assert TomlFile.read(path).line(("a",)) == 1
+
+
 @pytest.mark.parametrize("key", [("voltage",), ("other", "table"), ()])
 def test_a_key_without_any_place_in_the_file_has_no_line(path: Path, key: tuple[str, ...]) -> None:
     path.write_text(TEXT)

@@ -40,8 +40,11 @@ class BitstreamFit:
     def of(cls, known: Sequence[tuple[float, int]]) -> BitstreamFit:
         """Return the fit of (frames, size [bytes]) of at least one slot."""
         counts, sizes = np.array(known, dtype=np.float64).T
-        if len(np.unique(counts)) > 1:
-            slope, constant = np.polyfit(counts, sizes, 1)
+        centred = counts - counts.mean()
+        spread = centred @ centred
+        if spread > 0:
+            slope = centred @ sizes / spread
+            constant = sizes.mean() - slope * counts.mean()
             if slope >= 0 and constant >= 0:
                 return cls(float(constant), float(slope))
         return cls(0.0, float(counts @ sizes / (counts @ counts)))

@@ -77,6 +77,11 @@ class SharedResource:
 
     def _share(self) -> None:
         """Give every job its rate, and a new completion where that changes."""
+        if not self._holds and sum(job.limit for job in self._jobs) <= self._capacity:
+            for job in self._jobs:
+                if job.rate != job.limit:
+                    self._plan(job, job.limit)
+            return
         left = self._capacity
         for group in ([job for job in self._jobs if job.first], [job for job in self._jobs if not job.first]):
             # Whoever can use less than an equal share leaves the rest to the others.

@@ -60,8 +60,8 @@ def calibrate(
         ),
     ] = False,
     evaluations: Annotated[
-        int, typer.Option(min=2, help="Evaluations of the search, each one run per mapping.")
-    ] = 300,
+        int, typer.Option(min=2, help="Evaluations of the search, each three runs per mapping.")
+    ] = 200,
     requests: Annotated[
         int, typer.Option(min=20, help="Requests per client and run; more lower the noise.")
     ] = 300,
@@ -163,7 +163,7 @@ def _print(console: Console, found: Calibration) -> None:
         )
     console.print(constants)
     console.print(
-        f"objective {found.before:.3f} before, {found.after:.3f} after; from seed to seed it differs by "
+        f"objective {found.before:.3f} before, {found.after:.3f} after; between other seeds it differs by "
         f"{found.noise:.3f} (standard deviation). {found.evaluations} evaluations.",
         highlight=False,
     )

@@ -9,9 +9,10 @@ import typer
 from rich.console import Console
 
 from reconros_zenoh.board.profile import read_profile
-from reconros_zenoh.cli.experiment import MAPPINGS, ClockName, Out, plan, run
+from reconros_zenoh.cli.experiment import MAPPINGS, plan, run
+from reconros_zenoh.cli.options import ClockName, Out
 from reconros_zenoh.cli.progress import run_bar
-from reconros_zenoh.experiments.ablation import MECHANISMS, ablate
+from reconros_zenoh.experiments.ablation import ablate, runs_of_ablation
 from reconros_zenoh.experiments.roundtrip import all_right
 from reconros_zenoh.measure.compare import print_tables
 from reconros_zenoh.measure.report import write_report
@@ -39,8 +40,8 @@ def demo(
         if experiment["interrupted"]:
             raise typer.Exit(130)
         experiments.append(experiment)
-    with run_bar("what each mechanism is worth", len(MECHANISMS) * len(MAPPINGS), quiet=False) as advance:
-        ablation = ablate(read_profile(_PROFILE), planned.mappings, _ABLATION_REQUESTS, 0, advance)
+    with run_bar("what each mechanism is worth", runs_of_ablation(planned.mappings), quiet=False) as advance:
+        ablation = ablate(read_profile(_PROFILE), planned.mappings, _ABLATION_REQUESTS, advance)
     runs = [load_run(out / clock) for clock in ClockName]
     report = out / "report.html"
     write_report(report, [experiment for experiment, _ in runs], [records for _, records in runs], ablation)

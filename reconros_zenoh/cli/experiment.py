@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import json
-from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 from rich.console import Console
 
+from reconros_zenoh.cli.options import ClockName, Out, Profile, Seed
 from reconros_zenoh.cli.progress import ExperimentProgress
+from reconros_zenoh.cli.tables import callbacks, reconfiguration
 from reconros_zenoh.errors import UsageError
 from reconros_zenoh.experiments.roundtrip import (
     BoardReport,
@@ -24,22 +25,10 @@ from reconros_zenoh.measure.compare import print_tables
 from reconros_zenoh.project.loader import load_project
 
 app = typer.Typer(help="Run an experiment of the papers on emulated boards.", no_args_is_help=True)
+app.command("callbacks")(callbacks)
+app.command("reconfiguration")(reconfiguration)
 
 MAPPINGS = ("all_software", "mixed", "all_hardware")
-
-
-class ClockName(StrEnum):
-    """The two clocks."""
-
-    WALL = "wall"
-    VIRTUAL = "virtual"
-
-
-Profile = Annotated[
-    str, typer.Option(metavar="NAME|FILE", help="The kind of board; native models nothing (wall time only).")
-]
-Out = Annotated[Path, typer.Option(metavar="DIR", help="Folder for the records.")]
-Seed = Annotated[int, typer.Option(help="Seed of requests and model.")]
 
 
 @app.command("roundtrip")
@@ -72,24 +61,6 @@ def roundtrip(
     if experiment["interrupted"]:
         raise typer.Exit(130)
     raise typer.Exit(0 if all_right(experiment) else 1)
-
-
-@app.command("callbacks")
-def callbacks(
-    accuracy: Annotated[
-        Path, typer.Option(metavar="DIGITS.npz", help="Digits (images, labels) to classify.")
-    ],
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
-) -> None:
-    """Check the MNIST classifier: the share of digits that it classifies as labelled."""
-    from reconros_zenoh.applications.roundtrip.kernels import mnist  # loads OpenCV
-
-    images, labels = mnist.load_digits(accuracy)
-    share = mnist.accuracy(images, labels)
-    if as_json:
-        print(json.dumps({"digits": len(labels), "accuracy": share}))
-    else:
-        print(f"{share:.2%} of {len(labels)} digits classified as labelled")
 
 
 def plan(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from reconros_zenoh.experiments.parallel import ParallelRuns, Run, varied
+from reconros_zenoh.experiments.parallel import ParallelRuns, Run, pooled, varied
 from reconros_zenoh.measure.compare import experiment_tables
 
 if TYPE_CHECKING:
@@ -14,6 +14,9 @@ if TYPE_CHECKING:
     from reconros_zenoh.board.profile import Profile
 
 COMPLETE = "nothing"
+
+SEEDS = (0, 1)
+"""More than one, because a board can lock into another pattern from another start."""
 
 _EXECUTOR = ("model", "executor")
 _DDS = ("model", "dds")
@@ -35,17 +38,22 @@ MECHANISMS: dict[str, Mapping[tuple[str, ...], float | bool]] = {
 visits the callbacks is part of the algorithm and has no switch."""
 
 
+def runs_of_ablation(mappings: Mapping[str, Path]) -> int:
+    """Return how many runs `ablate` makes."""
+    return len(MECHANISMS) * len(mappings) * len(SEEDS)
+
+
 def ablate(
     profile: Profile,
     mappings: Mapping[str, Path],
     requests: int,
-    seed: int,
     on_run: Callable[[], None],
 ) -> dict[str, Any]:
-    """Return `requests`, `seed` and per entry of MECHANISMS the accuracy of the board without it.
+    """Return `requests`, `seeds` and per entry of MECHANISMS the accuracy of the board without it.
 
-    `variants` is a list of `off` and `accuracy` (as in `experiment_tables`), the complete board first. The
-    profile needs a model. `on_run` is called after each of the `len(MECHANISMS) * len(mappings)` runs.
+    `variants` is a list of `off` and `accuracy` (as in `experiment_tables`, over the round trips of all SEEDS
+    together), the complete board first. The profile needs a model. `on_run` is called after each of the
+    `runs_of_ablation(mappings)` runs.
     """
     variants = []
     with ParallelRuns() as parallel:
@@ -53,11 +61,15 @@ def ablate(
             Run(varied(profile, changes), mapping, requests, seed)
             for changes in MECHANISMS.values()
             for mapping in mappings.values()
+            for seed in SEEDS
         )
         for off in MECHANISMS:
             records = {}
             for mapping in mappings:
-                records[mapping] = next(runs)
-                on_run()
+                of_seeds = []
+                for _ in SEEDS:
+                    of_seeds.append(next(runs))
+                    on_run()
+                records[mapping] = pooled(of_seeds)
             variants.append({"off": off, "accuracy": experiment_tables(records)["accuracy"]})
-    return {"requests": requests, "seed": seed, "variants": variants}
+    return {"requests": requests, "seeds": list(SEEDS), "variants": variants}

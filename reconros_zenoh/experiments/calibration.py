@@ -2,8 +2,8 @@
 
 Published and assumed constants are held. The objective is the sum of |log(ours / measured)| over the
 quartiles of all cells (mapping and client). It is found by simulation, so it is neither smooth nor without
-noise: the search uses no derivatives, one seed, and takes a step only if it gains more than the objective
-differs from seed to seed.
+noise: the search uses no derivatives, the same seeds all along, and takes a step only if it gains more than
+the objective differs between other seeds.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from pydantic import BaseModel
 from reconros_zenoh.board.quantity import Count, Fraction, Quantity, Share
 from reconros_zenoh.errors import UsageError
 from reconros_zenoh.experiments.measured import quartiles_ms
-from reconros_zenoh.experiments.parallel import ParallelRuns, Run, varied
+from reconros_zenoh.experiments.parallel import ParallelRuns, Run, pooled, varied
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -29,8 +29,11 @@ if TYPE_CHECKING:
     from reconros_zenoh.experiments.measured import MeasuredMapping
     from reconros_zenoh.measure.record import Record
 
-NOISE_SEEDS = 5
-"""Seeds from which the noise and the figures before and after are found, the search's own being the first."""
+SAMPLES = 4
+"""Evaluations with seeds of their own that give the noise and the figures before and after; the search goes
+on with the seeds of the first."""
+
+_SEEDS = 3  # per evaluation: a board can lock into another pattern from another start
 
 _FIRST_STEP = 0.2
 _LAST_STEP = 0.02
@@ -62,7 +65,7 @@ class FittedConstant:
     """A constant and what became of it.
 
     `sensitivity` is the most that the objective changes when the constant is 20 % more or less. Data that
-    change it less than the seed does leave the constant undetermined.
+    change it no more than the seeds do leave the constant undetermined.
     """
 
     constant: Constant
@@ -73,7 +76,7 @@ class FittedConstant:
 
 @dataclass(frozen=True, slots=True)
 class FittedCell:
-    """A cell's quartiles [ms] as measured and, the mean of all seeds, before and after."""
+    """A cell's quartiles [ms] as measured and, as the mean of all samples, before and after."""
 
     mapping: str
     client: str
@@ -96,7 +99,7 @@ class Calibration:
 
 
 class _Evaluation(NamedTuple):
-    """The quartiles of all cells for one set of values and one seed, and the objective."""
+    """The quartiles of all cells for one set of values and one set of seeds, and the objective."""
 
     cells: dict[tuple[str, str], npt.NDArray[np.float64]]
     objective: float
@@ -119,7 +122,7 @@ def calibrated_constants(profile: Profile) -> list[Constant]:
 
 def planned_evaluations(constants: Sequence[Constant], evaluations: int) -> int:
     """Return how many evaluations a calibration takes at most, `evaluations` of them for the search."""
-    return evaluations + 2 * NOISE_SEEDS + 2 * len(constants)
+    return evaluations + 2 * SAMPLES + 2 * len(constants)
 
 
 def calibrate(
@@ -134,33 +137,35 @@ def calibrate(
 
     A pattern search along one constant after the other, in steps of its logarithm: it tries a step up and a
     step down, doubles the step where that helped and halves it where it did not, and ends after that many
-    `evaluations` or when all steps are below 2 %. `on_evaluation` is called after each evaluation (one run
-    under each measured mapping).
+    `evaluations` or when all steps are below 2 %. `on_evaluation` is called after each evaluation (three
+    runs of different seeds under each measured mapping).
     """
     constants = calibrated_constants(profile)
-    seeds = range(seed, seed + NOISE_SEEDS)
     with ParallelRuns() as parallel:
 
         def evaluate(points: Sequence[tuple[Sequence[float], int]]) -> list[_Evaluation]:
             runs = parallel.records(
-                Run(_profile(profile, constants, values), mapping.mapping, requests, of_seed)
-                for values, of_seed in points
+                Run(_profile(profile, constants, values), mapping.mapping, requests, each)
+                for values, sample in points
                 for mapping in measured
+                for each in range(seed + sample * _SEEDS, seed + (sample + 1) * _SEEDS)
             )
             found = []
             for _ in points:
-                found.append(_compare(measured, {m.name: next(runs) for m in measured}))
+                found.append(
+                    _compare(measured, [pooled([next(runs) for _ in range(_SEEDS)]) for _ in measured])
+                )
                 on_evaluation()
             return found
 
         start = [constant.value for constant in constants]
-        before = evaluate([(start, each) for each in seeds])
+        before = evaluate([(start, each) for each in range(SAMPLES)])
         noise = float(np.std([each.objective for each in before], ddof=1))
-        values, best, used = _search(constants, before[0].objective, noise, evaluations, seed, evaluate)
-        after = evaluate([(values, each) for each in seeds])
+        values, best, used = _search(constants, before[0].objective, noise, evaluations, evaluate)
+        after = evaluate([(values, each) for each in range(SAMPLES)])
         around = evaluate(
             [
-                (_moved(constants, values, index, factor), seed)
+                (_moved(constants, values, index, factor), 0)
                 for index in range(len(constants))
                 for factor in (1 + _SENSITIVITY_STEP, 1 - _SENSITIVITY_STEP)
             ]
@@ -172,7 +177,7 @@ def calibrate(
     return Calibration(
         profile=_profile(profile, constants, values),
         constants=tuple(
-            FittedConstant(constant, value, sensitivity, sensitivity >= noise)
+            FittedConstant(constant, value, sensitivity, sensitivity > noise)
             for constant, value, sensitivity in zip(constants, values, sensitivities, strict=True)
         ),
         cells=tuple(
@@ -198,7 +203,6 @@ def _search(
     best: float,
     noise: float,
     evaluations: int,
-    seed: int,
     evaluate: Callable[[Sequence[tuple[Sequence[float], int]]], list[_Evaluation]],
 ) -> tuple[list[float], float, int]:
     """Return the best values found, their objective, and how many evaluations that took."""
@@ -210,7 +214,7 @@ def _search(
             if step < _LAST_STEP or used + 2 > evaluations:
                 continue
             tried = [_moved(constants, values, index, factor) for factor in (math.exp(step), math.exp(-step))]
-            objectives = [each.objective for each in evaluate([(point, seed) for point in tried])]
+            objectives = [each.objective for each in evaluate([(point, 0) for point in tried])]
             used += len(tried)
             least = min(objectives)
             if least < best - noise:
@@ -258,12 +262,12 @@ def _profile(profile: Profile, constants: Sequence[Constant], values: Sequence[f
     return varied(profile, {constant.place: value for constant, value in zip(constants, values, strict=True)})
 
 
-def _compare(measured: Sequence[MeasuredMapping], records: Mapping[str, Mapping[str, Record]]) -> _Evaluation:
+def _compare(measured: Sequence[MeasuredMapping], records: Sequence[Mapping[str, Record]]) -> _Evaluation:
     cells = {}
     objective = 0.0
-    for mapping in measured:
+    for mapping, clients in zip(measured, records, strict=True):
         for client, real in mapping.quartiles_ms.items():
-            values_ms = records[mapping.name][client].values_ms
+            values_ms = clients[client].values_ms
             ours = quartiles_ms(values_ms) if values_ms.size else np.full(real.shape, _NO_ANSWER_MS)
             cells[mapping.name, client] = ours
             # A time may be a whole number of seconds, which is 0 modulo 1 s.

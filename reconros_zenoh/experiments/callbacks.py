@@ -174,7 +174,7 @@ def _alone(project: Project, callback: str, place: Place) -> Mapping:
 
 
 def _without_losses(profile: Profile, model: Model) -> Profile:
-    """Return the profile with a network that never loses a fragment: the table is not about waiting for it."""
+    """Return the profile with a network that loses nothing: the table is not about waiting for it."""
     never = {
         name: getattr(model.dds, name).model_copy(update={"value": 0.0})
         for name in ("nack_probability", "loss_probability")

@@ -97,8 +97,11 @@ class DeploymentRun:
         with Simulation(TypeRegistry()) as simulation:
             for plan in self._plans:
                 simulation.begin_network()
-                for board in plan.boards.values():
-                    simulation.add_board(board.profile, board.project, board.mapping, board.options)
+                for service, board in plan.boards.items():
+                    try:
+                        simulation.add_board(board.profile, board.project, board.mapping, board.options)
+                    except UsageError as error:
+                        raise UsageError(f"{service}: {error}") from error
                 for service, client in plan.clients.items():
                     trips = self.round_trips.setdefault(plan.place(client), {}).setdefault(service, [])
 

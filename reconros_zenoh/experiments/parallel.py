@@ -21,7 +21,7 @@ from reconros_zenoh.measure.record import Record
 from reconros_zenoh.project.loader import load_project
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
     from pathlib import Path
 
     from reconros_zenoh.measure.record import RoundTrip
@@ -56,11 +56,24 @@ class ParallelRuns:
         Raise ExperimentError if a process was ended from outside.
         """
         try:
-            yield from self._pool.map(_records, runs)
+            yield from self._pool.map(records_of, runs)
         except BrokenProcessPool:
             raise ExperimentError(
                 "a process of the simulation was ended from outside. Was there memory enough? Run it again."
             ) from None
+
+
+def pooled(records: Sequence[Mapping[str, Record]]) -> dict[str, Record]:
+    """Return one record per client with the round trips of all of these runs."""
+    return {
+        client: Record(
+            client,
+            np.concatenate([run[client].values_ms for run in records]),
+            lost=sum(run[client].lost for run in records),
+            wrong=sum(run[client].wrong for run in records),
+        )
+        for client in records[0]
+    }
 
 
 def varied(profile: Profile, changes: Mapping[tuple[str, ...], float | bool]) -> Profile:
@@ -86,7 +99,8 @@ def _ignore_interrupt() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
-def _records(run: Run) -> dict[str, Record]:
+def records_of(run: Run) -> dict[str, Record]:
+    """Return the record of each client after one run, made here and now."""
     project = load_project(application_folder())
     round_trips: dict[str, list[RoundTrip]] = {client: [] for client in CLIENTS}
     with Simulation(project.types()) as simulation:

@@ -11,6 +11,7 @@ import numpy as np
 from reconros_zenoh.board.bitstream import Bitstream
 from reconros_zenoh.board.bitstream_fit import BitstreamFit, left_out_errors
 from reconros_zenoh.board.board import Board
+from reconros_zenoh.clock.activity import Activity
 from reconros_zenoh.clock.virtual import VirtualEnvironment
 from reconros_zenoh.clock.wall import WallEnvironment
 from reconros_zenoh.errors import FileError, UsageError
@@ -36,10 +37,12 @@ ZYCAP_MB_S = 382.0
 PCAP_MB_S = 128.0
 """What the ports do nominally (ReconROS Executor, Section III-A, after the authors of ZyCAP)."""
 
+_SETTLE_NS = 10_000_000
+
 
 @dataclass(frozen=True, slots=True)
 class Printed:
-    """One row of Table II, the block RAM columns of RS #2 and RS #3 in their right order."""
+    """The size and the time of one row of Table II."""
 
     size_bytes: int
     t_rc_ms: float
@@ -95,15 +98,17 @@ def measure_reconfiguration(
     if model is None:
         raise UsageError(f"profile {profile.name!r} models no configuration port. Choose another --profile.")
     estimates = [_estimate(text, profile, model) for text in regions]
+    project = load_project(application_folder())
     environment = WallEnvironment() if clock == "wall" else VirtualEnvironment()
     network = SimulatedNetwork(environment)
-    project = load_project(application_folder())
     board = Board(environment, Context(network.transport("b0")), profile, project.slots)
     slots = {}
     try:
         for declared in project.configuration.slots:
             slot = board.slots[declared.id]
-            times_ms = environment.run(until=environment.process(_write(board, slot, writes)))
+            written = environment.event()
+            Activity(_write(board, slot, writes, written))
+            times_ms = environment.run(until=written)
             slots[str(slot.slot_id)] = _row(
                 slot, slot_resources(declared.regions), np.array(times_ms, dtype=np.float64), model
             )
@@ -135,16 +140,18 @@ def measure_reconfiguration(
 
 
 def _write(
-    board: Board, slot: ReconfigurableSlot, writes: int
-) -> Generator[simpy.Event | Awaitable, object, list[float]]:
-    """Write two bitstreams in turn and return how long each write took [ms]."""
+    board: Board, slot: ReconfigurableSlot, writes: int, done: simpy.Event
+) -> Generator[Awaitable, object, None]:
+    """Write two bitstreams in turn; `done` happens with how long each write took [ms]."""
+    # The loop may have to catch up with what came before.
+    yield board.environment.timeout(_SETTLE_NS)
     pair = [Bitstream(slot.slot_id, name, slot.bitstream_size) for name in ("first", "second")]
     times_ms = []
     for index in range(writes):
         started_ns = board.environment.clock_ns()
         yield from board.zycap.write_bitstream(slot, pair[index % 2])
         times_ms.append((board.environment.clock_ns() - started_ns) / 1e6)
-    return times_ms
+    done.succeed(times_ms)
 
 
 def _row(

@@ -60,7 +60,7 @@ def write_report(
 ) -> None:
     """Write one self-contained HTML file about the experiments, `records[i]` belonging to `experiments[i]`.
 
-    Experiments and records are as `load_run` returns them, one per clock. `ablation` has `requests`, `seed`
+    Experiments and records are as `load_run` returns them, one per clock. `ablation` has `requests`, `seeds`
     and `variants`, a list of `off` and `accuracy` with the complete model first. The file is complete or
     not there: it replaces an older one at the end. Raises UsageError if it cannot be written.
     """

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from html import escape
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -50,7 +51,25 @@ class Interval(NamedTuple):
         return f"{format_ms(self.value)} ({format_ms(self.low)} to {format_ms(self.high)})"
 
 
-def bootstrap(values: npt.NDArray[np.float64]) -> tuple[Interval, Interval, Interval]:
+class Figures(NamedTuple):
+    """What a sample says."""
+
+    median: Interval
+    mean: Interval
+    p99: Interval
+
+
+class _Compared(NamedTuple):
+    """A cell that the real board has: the error of our median, and the figures of both."""
+
+    mapping: str
+    client: str
+    error: float
+    ours: Figures
+    real: Figures
+
+
+def bootstrap(values: npt.NDArray[np.float64]) -> Figures:
     """Return median, mean and 99th percentile of the values (at least one) with their 95 % intervals.
 
     The percentile bootstrap: each figure over 500 samples drawn from the values with replacement; the same
@@ -61,10 +80,9 @@ def bootstrap(values: npt.NDArray[np.float64]) -> tuple[Interval, Interval, Inte
         [_figures(values[rng.integers(values.size, size=values.size)]) for _ in range(_RESAMPLES)]
     )
     low, high = np.percentile(figures, _INTERVAL, axis=0)
-    median, mean, p99 = (
-        Interval(*figure) for figure in zip(_figures(values), low.tolist(), high.tolist(), strict=True)
+    return Figures(
+        *(Interval(*figure) for figure in zip(_figures(values), low.tolist(), high.tolist(), strict=True))
     )
-    return median, mean, p99
 
 
 def trust_section(
@@ -82,12 +100,13 @@ def trust_section(
     if not chosen or not accuracy(chosen[0][0]["mappings"])["cells"]:
         return []
     experiment, its_records = chosen[0]
+    compared = _compared(experiment["mappings"], its_records)
     closeness = accuracy_sentence(accuracy(experiment["mappings"])).removeprefix("accuracy: ")
     parts = [
         "<h2>How far to trust this</h2>",
         f"<p>The run in {escape(experiment['clock'])} time: {escape(closeness)}</p>",
         "<h3>Each median beside the real board's</h3>",
-        _cells(experiment["mappings"], its_records),
+        _medians(compared),
         '<p class="small">Times in ms, modulo 1 s, in brackets the 95 % bootstrap interval.</p>',
     ]
     if ablation:
@@ -96,7 +115,7 @@ def trust_section(
     parts += [
         "<h3>What the data cannot tell</h3>",
         f"<ul>{unknown}</ul>",
-        _tails(experiment["mappings"], its_records),
+        _tails(compared),
         '<p class="small">Times in ms, modulo 1 s, in brackets the 95 % bootstrap interval.</p>',
     ]
     return parts
@@ -107,46 +126,56 @@ def _figures(values: npt.NDArray[np.float64]) -> tuple[float, float, float]:
     return float(median), float(values.mean()), float(p99)
 
 
-def _intervals(
-    mapping: str, client: str, record: Record
-) -> tuple[tuple[Interval, Interval, Interval], tuple[Interval, Interval, Interval]]:
+@cache
+def _real_figures(mapping: str, client: str) -> Figures:
     cell = reference_cells()[mapping][client]
     # As many values as were measured, at even steps of the known distribution.
-    real = np.array([cell.percentile(100 * (index + 0.5) / cell.n) for index in range(cell.n)])
-    return bootstrap(record.values_ms % LOGGED_MODULO_MS), bootstrap(real)
-
-
-def _cells(
-    mappings: Mapping[str, Mapping[str, Mapping[str, Any]]], records: Mapping[str, Mapping[str, Record]]
-) -> str:
-    rows: list[list[Cell]] = []
-    for mapping, client, error in _compared(mappings):
-        ours, real = _intervals(mapping, client, records[mapping][client])
-        rows.append([client, mapping, str(ours[0]), str(real[0]), (format_error(error), grade(error))])
-    return table(["client", "mapping", "our median", "real median", "error"], rows)
-
-
-def _tails(
-    mappings: Mapping[str, Mapping[str, Mapping[str, Any]]], records: Mapping[str, Mapping[str, Record]]
-) -> str:
-    rows: list[list[Cell]] = []
-    for mapping, client, _ in _compared(mappings):
-        ours, real = _intervals(mapping, client, records[mapping][client])
-        rows.append([client, mapping, *(str(side[figure]) for figure in (1, 2) for side in (ours, real))])
-    return table(["client", "mapping", "our mean", "real mean", "our p99", "real p99"], rows)
+    return bootstrap(np.array([cell.percentile(100 * (i + 0.5) / cell.n) for i in range(cell.n)]))
 
 
 def _compared(
-    mappings: Mapping[str, Mapping[str, Mapping[str, Any]]],
-) -> list[tuple[str, str, float]]:
-    """Return the cells that the real board has as (mapping, client, error), by client."""
+    mappings: Mapping[str, Mapping[str, Mapping[str, Any]]], records: Mapping[str, Mapping[str, Record]]
+) -> list[_Compared]:
+    """Return the cells that the real board has, by client."""
     clients = dict.fromkeys(client for row in mappings.values() for client in row)
     return [
-        (mapping, client, row[client]["median_error"])
+        _Compared(
+            mapping,
+            client,
+            row[client]["median_error"],
+            bootstrap(records[mapping][client].values_ms % LOGGED_MODULO_MS),
+            _real_figures(mapping, client),
+        )
         for client in clients
         for mapping, row in mappings.items()
         if client in row and row[client]["median_error"] is not None
     ]
+
+
+def _medians(compared: Sequence[_Compared]) -> str:
+    rows: list[list[Cell]] = [
+        [
+            cell.client,
+            cell.mapping,
+            str(cell.ours.median),
+            str(cell.real.median),
+            (format_error(cell.error), grade(cell.error)),
+        ]
+        for cell in compared
+    ]
+    return table(["client", "mapping", "our median", "real median", "error"], rows)
+
+
+def _tails(compared: Sequence[_Compared]) -> str:
+    rows: list[list[Cell]] = [
+        [
+            cell.client,
+            cell.mapping,
+            *map(str, (cell.ours.mean, cell.real.mean, cell.ours.p99, cell.real.p99)),
+        ]
+        for cell in compared
+    ]
+    return table(["client", "mapping", "our mean", "real mean", "our p99", "real p99"], rows)
 
 
 def _ablation(ablation: Mapping[str, Any]) -> list[str]:
@@ -180,9 +209,10 @@ def _ablation(ablation: Mapping[str, Any]) -> list[str]:
         )
     )
     how = (
-        "The same experiment with one mechanism of the board model switched off at a time, in virtual time "
-        f"with {ablation['requests']} requests per client and seed {ablation['seed']}; the constants were "
-        "not fitted again. What changes little here may still shape the tails, which the medians do not see."
+        "The same experiment with one mechanism of the board model switched off at a time, in virtual time, "
+        f"with {ablation['requests']} requests per client and {len(ablation['seeds'])} seeds together; the "
+        "constants were not fitted again. What changes little here may still shape the tails, which the "
+        "medians do not see."
     )
     return [
         f"<p>{escape(how)}</p>",

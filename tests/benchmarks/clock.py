@@ -15,7 +15,8 @@ from typing import Any
 import simpy.rt
 from table import arguments, print_result
 
-from reconros_zenoh.cli.experiment import ClockName, plan, run
+from reconros_zenoh.cli.experiment import plan, run
+from reconros_zenoh.cli.options import ClockName
 
 EVENTS = 2000
 PERIOD_S = 0.0025

@@ -20,7 +20,7 @@ from board_daemon.hosting import BoardOptions
 from host_clients.daemon import ClientOptions
 from reconros_zenoh.board.profile import read_profile
 from reconros_zenoh.cli.experiment import MAPPINGS
-from reconros_zenoh.experiments.roundtrip import CLIENTS, application_folder
+from reconros_zenoh.experiments.roundtrip import ANSWER_LIMIT_S, CLIENTS, application_folder
 from reconros_zenoh.experiments.simulation import Simulation
 from reconros_zenoh.project.loader import load_project
 
@@ -48,7 +48,8 @@ def ours(mapping: str, requests: int) -> int:
         )
         for client in CLIENTS:
             simulation.add_client(
-                ClientOptions(client, "", requests, group="engine", members=len(CLIENTS)), lambda _: None
+                ClientOptions(client, "", requests, ANSWER_LIMIT_S, group="engine", members=len(CLIENTS)),
+                lambda _: None,
             )
         simulation.run()
         return simulation.environment.now

@@ -8,6 +8,7 @@ import msgpack
 import pytest
 from small_board import Tickets, desktop, logging_thread, small_board, small_profile, types
 
+from reconros_zenoh.board import control
 from reconros_zenoh.board.control import ControlServer, alive_key, ask_status, claim_name, status
 from reconros_zenoh.board.endpoints import SubscriptionSource
 from reconros_zenoh.board.executor import Executor
@@ -95,6 +96,13 @@ def test_in_wall_time_the_status_says_how_late_the_event_loop_was() -> None:
     assert host["lag_p99_us"] >= host["lag_p50_us"]
 
 
+def test_the_status_says_how_often_and_how_long_the_host_was_too_slow() -> None:
+    board, executor = board_that_ran()
+    board.host.overruns.count, board.host.overruns.total_ns = 2, 3_500_000
+    assert status(board, executor)["host"]["overruns"] == 2
+    assert status(board, executor)["host"]["overrun_ms"] == 3.5
+
+
 def test_over_the_wire_the_status_is_msgpack() -> None:
     board, executor = board_that_ran()
     server = ControlServer(board, executor)
@@ -134,53 +142,74 @@ def test_the_token_of_a_board() -> None:
 
 
 class Answering:
-    """A transport whose peer has answered already."""
+    """A transport whose peer answers at once, when it has been found."""
 
     def __init__(self, reply: Reply | None) -> None:
         self._reply = reply
-        self.closed = False
+        self.log: list[str] = []
 
     def request(self, key: str, on_matching: Callable[[bool], None]) -> Answering:
-        assert key == "reconros/board0/status"
+        self.log.append(f"request {key}")
+        on_matching(False)
+        self.log.append("found")
         on_matching(True)
         return self
 
     def get(self, parts: Any, attachment: Any, on_reply: Callable[[Reply | None], None], _: int) -> None:
+        self.log.append("get")
         if self._reply is not None:
             on_reply(self._reply)
         on_reply(None)
 
     def close(self) -> None:
-        self.closed = True
+        self.log.append("close")
 
 
-def ask(reply: Reply | None) -> dict[str, Any]:
+def ask(reply: Reply | None, monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
     transport = Answering(reply)
+
+    class NotingEvent:
+        def set(self) -> None:
+            transport.log.append("set")
+
+        def wait(self, timeout_s: float) -> None:
+            transport.log.append(f"wait {timeout_s} s")
+
+    monkeypatch.setattr(control, "Event", NotingEvent)
     try:
         return ask_status(transport, "board0")  # type: ignore[arg-type] # all of a transport that it needs
     finally:
-        assert transport.closed
+        # A session that is just open has to hear of the board first.
+        assert transport.log == [
+            "request reconros/board0/status",
+            "found",
+            "set",
+            "wait 2.0 s",
+            "get",
+            "close",
+        ]
 
 
 def packed(content: object) -> Reply:
     return Reply(memoryview(msgpack.packb(content)), None, None)
 
 
-def test_the_status_of_a_board_that_answers() -> None:
-    assert ask(packed({"version": 1, "board": "board0"})) == {"version": 1, "board": "board0"}
+def test_the_status_of_a_board_that_answers(monkeypatch: pytest.MonkeyPatch) -> None:
+    told = {"version": 1, "board": "board0"}
+    assert ask(packed(told), monkeypatch) == told
 
 
 @pytest.mark.parametrize("reply", [None, Reply(None, None, "no")], ids=["silence", "error"])
-def test_a_board_that_does_not_answer(reply: Reply | None) -> None:
+def test_a_board_that_does_not_answer(reply: Reply | None, monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(
         TransportError, match=r"no board named 'board0' answers\..*reconros board --name board0"
     ):
-        ask(reply)
+        ask(reply, monkeypatch)
 
 
-def test_a_board_of_another_version() -> None:
+def test_a_board_of_another_version(monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(TransportError, match="'board0' speaks version 2 of the status, not 1"):
-        ask(packed({"version": 2}))
+        ask(packed({"version": 2}), monkeypatch)
 
 
 def test_nobody_answers_in_an_empty_network() -> None:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from small_board import Steps
 
-    from reconros_zenoh.board.callback import SoftwareContext
+    from reconros_zenoh.board.callback import HardwareThread, SoftwareContext
 
 LIMIT_S = 10
 MS = 1_000_000
@@ -220,17 +220,25 @@ def test_a_kernel_that_raises_is_tried_again() -> None:
     assert kernel.calls == 2
 
 
-def test_a_slow_host_shows_in_the_spans_of_the_callback_and_of_nobody_else() -> None:
+@pytest.mark.parametrize("in_hardware", [True, False], ids=["hardware", "software"])
+def test_a_slow_host_shows_in_the_spans_of_the_callback(in_hardware: bool) -> None:
     environment = WallEnvironment()
-    board = small_board(small_profile({"slow": (1 * MS, 0)}), environment=environment, threads=1)
-    executor = Executor(board, software_workers=1, hardware_workers=0)
+    board = small_board(small_profile({"slow": (1 * MS, 1 * MS)}), 1, environment=environment, threads=1)
+    executor = Executor(board, software_workers=1, hardware_workers=1)
     source = Tickets(board)
     may_end = threading.Event()
 
-    def callback(_: object, __: SoftwareContext) -> bool:
+    def function(_: object, __: SoftwareContext) -> bool:
         return may_end.wait(LIMIT_S)
 
-    executor.add_sw_callback("slow", CallbackKind.SUB, source, callback)
+    def thread(thread: HardwareThread) -> Steps:
+        yield from thread.compute(may_end.wait, LIMIT_S)
+        yield from thread.mem_write(np.zeros(100, np.uint8))
+
+    if in_hardware:
+        executor.add_hw_callback("slow", [0], CallbackKind.SUB, source, thread)
+    else:
+        executor.add_sw_callback("slow", CallbackKind.SUB, source, function)
     executor.spin()
     environment.call_later(0, source.put, "ticket")
     environment.call_later(3 * MS, may_end.set)
@@ -240,5 +248,7 @@ def test_a_slow_host_shows_in_the_spans_of_the_callback_and_of_nobody_else() -> 
     board.close()
     (timeline,) = source.timelines
     assert timeline.stages_ns["execution"] == 1 * MS
-    assert timeline.stages_ns["overrun"] == board.host.overruns.total_ns >= 2 * MS
+    # It began after at most 1000 ns, the time of a reconfiguration.
+    assert timeline.stages_ns["overrun"] == board.host.overruns.total_ns >= 2 * MS - 1000
     assert board.host.overruns.count == 1
+    assert timeline.stages_ns["memif"] == (100 if in_hardware else 0)

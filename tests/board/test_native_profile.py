@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,6 +16,8 @@ from reconros_zenoh.clock.wall import WallEnvironment
 from reconros_zenoh.executor.callbacks import CallbackKind
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from small_board import Steps
 
     from reconros_zenoh.board.board import Board
@@ -22,8 +25,14 @@ if TYPE_CHECKING:
     from reconros_zenoh.board.spans import Timeline
 
 
-def serve_words(board: Board, *, in_hardware: bool) -> Executor:
-    """A callback `walk`, of which no profile knows, that publishes its number and one more."""
+LIMIT_S = 10
+MS = 1_000_000
+
+
+def serve_words(
+    board: Board, *, in_hardware: bool, kernel: Callable[[int], int] = lambda number: number + 1
+) -> Executor:
+    """A callback `walk`, of which no profile knows, that publishes what the kernel makes of its number."""
     word = types().message("std_msgs/msg/UInt32")
     node = board.context.node("server")
     source, writer = SubscriptionSource(board, node, word, "in"), TopicWriter(board, node, word, "out")
@@ -31,12 +40,12 @@ def serve_words(board: Board, *, in_hardware: bool) -> Executor:
     def thread(thread: HardwareThread) -> Steps:
         message = yield from thread.get_init_data()
         ram = yield from thread.mem_read(np.array([message.data], np.uint32))
-        number = yield from thread.compute(lambda ram: int(ram[0]) + 1, ram)
+        number = yield from thread.compute(kernel, int(ram[0]))
         yield from thread.mem_write(np.array([number], np.uint32))
         yield from thread.publish(writer, writer.message(data=number))
 
     def function(message: Any, context: SoftwareContext) -> None:
-        context.publish(writer, writer.message(data=context.compute(lambda number: number + 1, message.data)))
+        context.publish(writer, writer.message(data=context.compute(kernel, message.data)))
 
     executor = Executor(board, 1, len(board.slots))
     if in_hardware:
@@ -96,7 +105,13 @@ def test_a_service_takes_no_modelled_time() -> None:
 def test_in_wall_time_everything_takes_as_long_as_it_takes(in_hardware: bool) -> None:
     environment = WallEnvironment()
     board = small_board(read_profile("native"), 1, environment=environment, threads=2)
-    serve_words(board, in_hardware=in_hardware)
+
+    def kernel_of_a_millisecond(_: int) -> int:
+        may_end = threading.Event()
+        environment.post(environment.call_later, MS, may_end.set)
+        return int(may_end.wait(LIMIT_S))
+
+    serve_words(board, in_hardware=in_hardware, kernel=kernel_of_a_millisecond)
     word = types().message("std_msgs/msg/UInt32")
     client = desktop(board).node("client")
     done = environment.event()
@@ -115,5 +130,6 @@ def test_in_wall_time_everything_takes_as_long_as_it_takes(in_hardware: bool) ->
     board.close()
     (timeline,) = timelines
     assert timeline.total_ns == sum(timeline.stages_ns.values())
+    assert timeline.stages_ns["execution"] >= MS
     assert not {"reconfiguration", "memif", "osif", "dispatch"} & stages(timeline).keys()
     assert board.host.overruns.count == 0

@@ -72,6 +72,7 @@ def test_fractions_and_counts_have_the_unit_one() -> None:
         (Share, 1, "1"),
         (Count, 1, "1"),
         (Bandwidth, 0.001, "B/s"),
+        (Frequency, 0.001, "Hz"),
     ],
 )
 def test_the_smallest_and_the_largest(kind: type[Quantity], value: float, unit: str) -> None:
@@ -124,6 +125,13 @@ def test_value_unit_and_basis_are_required(key: str) -> None:
     del fields[key]
     with pytest.raises(ValidationError, match=key):
         Duration.model_validate(fields)
+
+
+def test_a_quantity_has_no_other_keys_and_cannot_be_changed() -> None:
+    with pytest.raises(ValidationError, match="units"):
+        Duration.model_validate({"value": 1, "unit": "ms", "basis": "assumed", "units": "ms"})
+    with pytest.raises(ValidationError, match="frozen"):
+        of(Duration, 1, "ms").value = 2
 
 
 def test_the_basis_is_one_of_three_and_a_source_may_be_given() -> None:
