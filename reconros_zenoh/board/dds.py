@@ -36,9 +36,8 @@ class DdsStack:
     direction: a small message that comes behind a large one waits for it. On the real board that is what
     delays a small round trip by most of a Sobel image's way in and out (reference data, DESIGN.md).
 
-    The fragments of a large message go over the link while the stack works on those before them. A large
-    message may lose a fragment: then it is resent whole after `nack_delay`, or, when the request for it is
-    lost too, after the next heartbeat of its writer.
+    A large message may lose a fragment: then it is resent whole after `nack_delay`, or, when the request for
+    it is lost too, after the next heartbeat of its writer.
 
     The link is charged here rather than in the transport, so that the same model holds in both clocks. In
     wall time a message has spent some of the modelled link time in the real network already: its source
@@ -84,10 +83,9 @@ class DdsStack:
         known_ns = min(max(0, transit_ns), self._link_ns(size))
         self._transit_ns[large] += (known_ns - self._transit_ns[large]) / _TRANSITS_REMEMBERED
         left_ns = min(timeline.started_ns, self._environment.now)
-        yield from self._until(left_ns + self._link_ns(min(size, self._large_from)))
+        yield from self._until(left_ns + self._link_ns(size))
         timeline.mark("transport")
         yield from self._process(size)
-        yield from self._until(left_ns + self._link_ns(size))
         timeline.mark("dds")
         yield from self._repair(size, timeline)
 
@@ -96,12 +94,10 @@ class DdsStack:
         if not self._modelled:
             timeline.mark("dds")
             return
-        began_ns = self._environment.now
         yield from self._process(size)
         timeline.mark("dds")
         yield from self._repair(size, timeline)
-        last_fragment_ns = self._environment.now + self._link_ns(min(size, self._large_from))
-        arrives_ns = max(last_fragment_ns, began_ns + self._link_ns(size))
+        arrives_ns = self._environment.now + self._link_ns(size)
         yield from self._until(arrives_ns - round(self._transit_ns[size > self._large_from]))
         timeline.mark("transport")
 
