@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import sys
-import threading
 import time
 from collections import OrderedDict
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -23,6 +20,7 @@ if TYPE_CHECKING:
 R = TypeVar("R")
 R_co = TypeVar("R_co", covariant=True)
 _RESULTS_KEPT = 512
+_RUNS_REMEMBERED = 32
 _IN_LINE_NS = 100_000
 """About what it costs to hand a computation to another thread and its result back."""
 
@@ -64,13 +62,7 @@ class Host:
     def __init__(self, environment: VirtualEnvironment, threads: int | None) -> None:
         """`threads` is the size of the pool, None in virtual time."""
         self._environment = environment
-        self._pool = (
-            None
-            if threads is None
-            else ThreadPoolExecutor(
-                threads, thread_name_prefix="computation", initializer=_yield_to_the_clock
-            )
-        )
+        self._pool = None if threads is None else ThreadPoolExecutor(threads, "computation")
         self._expected_ns: dict[object, float] = {}
         self._results: OrderedDict[object, object] = OrderedDict()
         self.overruns = Overruns()
@@ -129,13 +121,9 @@ class Host:
         finally:
             took_ns = time.perf_counter_ns() - started_ns
             expected_ns = self._expected_ns.get(task, took_ns)
-            self._expected_ns[task] = expected_ns + (took_ns - expected_ns) / 8
-
-
-def _yield_to_the_clock() -> None:
-    """Let the thread that keeps the clock go first where cores are short; Linux has priorities per thread."""
-    if sys.platform == "linux":
-        os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), 10)
+            # In the pool it may have waited for the interpreter or a core: the shortest times tell more.
+            slower_ns = (took_ns - expected_ns) / _RUNS_REMEMBERED
+            self._expected_ns[task] = min(took_ns, expected_ns + slower_ns)
 
 
 class _Unchanging:

@@ -126,6 +126,13 @@ def test_a_computation_that_fails_late_is_an_overrun_too() -> None:
         assert host.overruns.count == 1
 
 
+def test_a_closed_host_starts_nothing_more() -> None:
+    board = small_board(small_profile(), environment=WallEnvironment(), threads=1)
+    board.close()
+    with pytest.raises(RuntimeError, match="cannot schedule new futures after shutdown"):
+        board.host.start("task", max, 1, 2)
+
+
 def test_two_computations_run_at_the_same_time_in_wall_time() -> None:
     with wall_host() as (environment, host):
         both = threading.Barrier(2, timeout=LIMIT_S)

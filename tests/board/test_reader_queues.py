@@ -72,6 +72,22 @@ def test_the_oldest_message_is_pushed_out_while_the_stack_is_busy() -> None:
     assert board.source.dropped == 2
 
 
+def test_the_time_of_a_message_counts_from_its_source_timestamp() -> None:
+    board = small_board(small_profile({"a": (1000, 0)}, link_ns=500))
+    word = types().message("std_msgs/msg/UInt32")
+    source = SubscriptionSource(board, board.context.node("server"), word, "in")
+    source.open(lambda: None, None)
+    sender = desktop(board)
+    sender.clock_ns = lambda: board.environment.now - 300  # it was on its way for 300 ns
+    publisher = sender.node("client").publisher(word, "in")
+    board.environment.call_later(1000, publisher.publish, word.cls(data=1))
+    board.environment.run(until=5000)
+    timeline = source.take().timeline
+    assert timeline.started_ns == 700
+    assert timeline.stages_ns["transport"] == 500
+    assert timeline.stages_ns["queue"] == 5000 - 1200
+
+
 def test_what_waited_behind_another_message_has_crossed_the_link_meanwhile() -> None:
     board = Subscriber(small_profile({"a": (1, 0)}, dds_message_ns=100, link_ns=70), depth=10)
     board.publish_at(0, 1, 2, 3)

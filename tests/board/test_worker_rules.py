@@ -207,6 +207,21 @@ def test_two_slots_compute_side_by_side_but_are_reconfigured_one_after_the_other
     assert [slot.busy_ns for slot in board.board.slots.values()] == [5000, 5000]
 
 
+def test_a_callback_that_has_ended_may_go_on_at_once_in_the_slot_of_another_worker() -> None:
+    board = HardwareBoard(small_profile({"a": (0, 5000), "b": (0, 5000)}), {"a": [0, 1], "b": [0]})
+    board.sources["a"].put_at(0, 10)
+    board.sources["b"].put_at(20)
+    board.environment.run(until=20_000)
+    assert board.log == [
+        (1000, "a starts"),
+        (6000, "a is done"),  # b and another a wait: slot 0 takes b, so the idle slot 1 takes a
+        (7000, "a starts"),
+        (8000, "b starts"),
+        (12_000, "a is done"),
+        (13_000, "b is done"),
+    ]
+
+
 def test_callbacks_that_share_a_slot_push_each_other_out() -> None:
     board = HardwareBoard(small_profile({"a": (0, 100), "b": (0, 100)}), {"a": [0], "b": [0]})
     board.sources["a"].put_at(0, 10_000)

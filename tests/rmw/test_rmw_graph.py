@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import time
 from typing import TYPE_CHECKING, Any
 
 import pytest
 from two_sessions import TwoSessions, types
 
 from reconros_zenoh.errors import UsageError
+from reconros_zenoh.rmw.node import Context
 from reconros_zenoh.ros.graph import EndpointKind, EndpointToken, NodeToken, parse
 from reconros_zenoh.ros.qos import Durability, QosProfile
 
@@ -116,6 +118,14 @@ def test_the_domain_stands_in_token_and_key() -> None:
     publisher = sessions.here.node("talker").publisher(types().message("std_msgs/msg/UInt32"), "out")
     assert publisher.key.startswith("7/out/")
     assert all(token.startswith("@ros2_lv/7/a1/") for token in sessions.tokens())
+
+
+def test_a_context_is_in_domain_0_and_on_the_clock_of_the_host_unless_told_otherwise(
+    sessions: TwoSessions,
+) -> None:
+    context = Context(sessions.network.transport("e5"))
+    assert context.domain == 0
+    assert context.clock_ns is time.time_ns
 
 
 @pytest.mark.parametrize(

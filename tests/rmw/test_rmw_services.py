@@ -222,7 +222,9 @@ def test_a_bad_request_gets_an_error_reply_with_the_reason_and_is_counted_and_lo
     assert all(error is not None and error.startswith(said) for error in errors)
     assert got == []
     assert sessions.there.rejections.counts() == {said.partition(":")[0]: 3}
-    assert len(caplog.records) == 1
+    (record,) = caplog.records
+    sender = f"publisher {bytes(range(16)).hex()}" if attached else "an unknown sender"
+    assert f"from {sender} (" in record.getMessage()
     querier.get((GOOD,), ATTACHED, replies.append, SECOND_NS)
     sessions.settle()
     assert len(got) == 1, "a good request passes"
