@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from abc import ABC, abstractmethod
 from threading import RLock
 from typing import TYPE_CHECKING, Self, TypeVarTuple, Unpack
 
@@ -16,14 +17,14 @@ _log = logging.getLogger(__name__)
 _Arguments = TypeVarTuple("_Arguments")
 
 
-class Closing:
+class Closing(ABC):
     """As a context manager it closes itself."""
 
     __slots__ = ()
 
+    @abstractmethod
     def close(self) -> None:
         """Be over. Idempotent."""
-        raise NotImplementedError
 
     def __enter__(self) -> Self:
         return self
@@ -34,7 +35,7 @@ class Closing:
         self.close()
 
 
-class GuardedDeclaration:
+class GuardedDeclaration(ABC):
     """A declaration whose callbacks run one at a time and never once `close` has returned.
 
     A subclass calls them through `call` and says in `withdraw` how it leaves the network.
@@ -76,6 +77,6 @@ class GuardedDeclaration:
             self.is_closed = True
         self.withdraw()
 
+    @abstractmethod
     def withdraw(self) -> None:
         """Leave the network; called once."""
-        raise NotImplementedError

@@ -198,6 +198,31 @@ def test_equal_arrays_are_equal_however_they_lie_in_memory() -> None:
     assert kernel.calls == 1
 
 
+def read_only(content: Any) -> Any:
+    array = np.array(content)
+    array.setflags(write=False)
+    return array
+
+
+def test_an_array_that_nobody_can_change_is_known_without_a_look_at_its_content() -> None:
+    host = Host(VirtualEnvironment(), threads=None)
+    kernel = Counting(np.sum)
+    source, other = read_only([1, 2]), read_only([1, 5])
+    assert [host.compute(kernel, array) for array in (source, other, source, other)] == [3, 6, 3, 6]
+    assert kernel.calls == 2
+
+
+def test_a_read_only_view_of_an_array_that_changes_is_computed_anew() -> None:
+    host = Host(VirtualEnvironment(), threads=None)
+    kernel = Counting(np.sum)
+    array = np.array([1, 2])
+    view = array.view()
+    view.setflags(write=False)
+    assert host.compute(kernel, view) == 3
+    array[0] = 7
+    assert host.compute(kernel, view) == 9
+
+
 def test_two_kernels_do_not_share_results() -> None:
     host = Host(VirtualEnvironment(), threads=None)
     assert host.compute(np.max, GRID) == 5
