@@ -15,7 +15,7 @@ _OBJECTS_BETWEEN_COLLECTIONS = 50_000
 
 
 def tune_memory() -> None:
-    """What was imported is no longer searched for garbage, and large buffers stay in this process.
+    """Leave what was imported out of the search for garbage, and keep large buffers in this process.
 
     To be called once, when everything is imported and before any thread starts. CPython's collector would go
     through all modules time and again.
