@@ -37,7 +37,8 @@ class DdsStack:
     delays a small round trip by most of a Sobel image's way in and out (reference data, DESIGN.md).
 
     A large message may lose a fragment: then it is resent whole after `nack_delay`, or, when the request for
-    it is lost too, after the next heartbeat of its writer.
+    it is lost too, after the next heartbeat of its writer. What comes in while callbacks keep every core busy
+    is lost more often, because the thread that empties the socket gets its turn late.
 
     The link is charged here rather than in the transport, so that the same model holds in both clocks. In
     wall time a message has spent some of the modelled link time in the real network already: its source
@@ -69,6 +70,7 @@ class DdsStack:
             self._nack_probability = dds.nack_probability.share
             self._nack_delay_ns = dds.nack_delay.ns
             self._loss_probability = dds.loss_probability.share
+            self._loss_probability_busy = dds.loss_probability_busy.share
             self._heartbeat_ns = dds.heartbeat_period.ns
 
     def receive(self, size: int, transit_ns: int, timeline: Timeline) -> Generator[Awaitable, object, None]:
@@ -87,7 +89,10 @@ class DdsStack:
         timeline.mark("transport")
         yield from self._process(size)
         timeline.mark("dds")
-        yield from self._repair(size, timeline)
+        busy = self._cpu.is_busy
+        yield from self._repair(
+            size, timeline, self._loss_probability_busy if busy else self._loss_probability
+        )
 
     def send(self, size: int, timeline: Timeline) -> Generator[Awaitable, object, None]:
         """Return when a message of `size` bytes has gone through the stack and over the link."""
@@ -96,7 +101,7 @@ class DdsStack:
             return
         yield from self._process(size)
         timeline.mark("dds")
-        yield from self._repair(size, timeline)
+        yield from self._repair(size, timeline, self._loss_probability)
         arrives_ns = self._environment.now + self._link_ns(size)
         yield from self._until(arrives_ns - round(self._transit_ns[size > self._large_from]))
         timeline.mark("transport")
@@ -123,11 +128,13 @@ class DdsStack:
         yield from self._cpu.run_stack(passage.duration_ns * self._core_share, self._core_share)
         passage.done.fire()
 
-    def _repair(self, size: int, timeline: Timeline) -> Generator[Awaitable, object, None]:
+    def _repair(
+        self, size: int, timeline: Timeline, loss_probability: float
+    ) -> Generator[Awaitable, object, None]:
         """Return when no fragment of a large message is missing any more."""
         if size <= self._large_from:
             return
-        if self._randomness.random() < self._loss_probability:
+        if self._randomness.random() < loss_probability:
             yield self._environment.timeout(round(self._randomness.uniform(0, self._heartbeat_ns)))
             timeline.mark("retransmission")
         while self._randomness.random() < self._nack_probability:

@@ -69,9 +69,9 @@ class DdsSection(_Section):
     A message takes `per_message` and its bytes; one of more than `large_from` goes in fragments of that size
     and takes `per_byte_large`. Meanwhile the stack keeps one core busy for `core_share` of the time. Times
     vary by `jitter` (standard deviation of their logarithm). A large message is resent whole with probability
-    `nack_probability`, `nack_delay` after its first copy; with `loss_probability` it waits for the next
-    heartbeat of its writer, one per `heartbeat_period`. `recovery` is how long the stack needs to go on after
-    a reconfiguration stalled it.
+    `nack_probability`, `nack_delay` after its first copy. With `loss_probability`, or `loss_probability_busy`
+    if it comes while callbacks keep every core busy, it waits for the next heartbeat of its writer, one per
+    `heartbeat_period`. `recovery` is how long the stack needs to go on after a reconfiguration stalled it.
     """
 
     per_message: Duration
@@ -83,6 +83,7 @@ class DdsSection(_Section):
     nack_probability: Fraction
     nack_delay: Duration
     loss_probability: Fraction
+    loss_probability_busy: Fraction
     heartbeat_period: Duration
     recovery: Duration
     stalled_by_reconfiguration: bool

@@ -66,6 +66,11 @@ class SharedResource:
         self._share(job)
         yield job
 
+    @property
+    def is_saturated(self) -> bool:
+        """Whether the jobs not marked `first` could use all of it."""
+        return sum(job.limit for job in self._jobs if not job.first) >= self._capacity
+
     def hold_first(self) -> None:
         """Stop serving the jobs marked `first` until as many `release_first`; their work waits."""
         self._holds += 1

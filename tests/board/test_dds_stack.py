@@ -34,6 +34,7 @@ LOSSY = small_profile(
     nack_probability=0.1,
     nack_delay_ns=10_000,
     loss_probability=0.01,
+    loss_probability_busy=0.3,
     heartbeat_ns=3_000_000,
 )
 NATIVE = PROFILE.model_copy(update={"model": None})
@@ -154,6 +155,15 @@ def test_what_the_board_sends_can_be_lost_too() -> None:
         "retransmission": 10_000 + 10_100,
         "transport": 4500,
     }
+
+
+def test_what_comes_while_callbacks_keep_every_core_busy_is_lost_more_often() -> None:
+    stack = Stack(LOSSY, 0.29, 0.5, 0.9)
+    start(stack.environment, stack.cpu.run(100_000))
+    assert stack.receive(2000)["retransmission"] == 1_500_000
+    stack = Stack(LOSSY, 0.29, 0.9)
+    start(stack.environment, stack.cpu.run(100_000))
+    assert "retransmission" not in stack.send(2000)
 
 
 def test_a_small_message_is_never_lost() -> None:
