@@ -33,7 +33,7 @@ class Cpu:
 
     @property
     def is_busy(self) -> bool:
-        """Whether threads other than the stack keep every core busy."""
+        """Whether other threads keep every core busy, or the stack is stalled."""
         return self._cores.is_saturated
 
     def stall_stack(self) -> None:

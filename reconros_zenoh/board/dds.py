@@ -36,9 +36,10 @@ class DdsStack:
     direction: a small message that comes behind a large one waits for it. On the real board that is what
     delays a small round trip by most of a Sobel image's way in and out (reference data, DESIGN.md).
 
-    A large message may lose a fragment: then it is resent whole after `nack_delay`, or, when the request for
-    it is lost too, after the next heartbeat of its writer. What comes in while callbacks keep every core busy
-    is lost more often, because the thread that empties the socket gets its turn late.
+    A large message that comes in may lose a fragment: then it is resent whole after `nack_delay`, or, when
+    the request for it is lost too, after the next heartbeat of its writer. What comes while all cores are
+    busy or the stack is stalled is lost more often, because the thread that empties the socket gets its turn
+    late. The desktop loses nothing.
 
     The link is charged here rather than in the transport, so that the same model holds in both clocks. In
     wall time a message has spent some of the modelled link time in the real network already: its source
@@ -63,7 +64,8 @@ class DdsStack:
             self._link_ns_per_byte = link.per_byte.ns_per_byte
             self._message_ns = dds.per_message.ns
             self._ns_per_byte = dds.per_byte.ns_per_byte
-            self._ns_per_byte_large = dds.per_byte_large.ns_per_byte
+            self._receive_ns_per_byte = dds.receive_per_byte_large.ns_per_byte
+            self._send_ns_per_byte = dds.send_per_byte_large.ns_per_byte
             self._large_from = dds.large_from.bytes
             self._core_share = dds.core_share.share
             self._jitter = dds.jitter.share
@@ -87,21 +89,19 @@ class DdsStack:
         left_ns = min(timeline.started_ns, self._environment.now)
         yield from self._until(left_ns + self._link_ns(size))
         timeline.mark("transport")
-        yield from self._process(size)
+        probability = self._loss_probability_busy if self._cpu.is_busy else self._loss_probability
+        yield from self._process(size, self._receive_ns_per_byte)
         timeline.mark("dds")
-        busy = self._cpu.is_busy
-        yield from self._repair(
-            size, timeline, self._loss_probability_busy if busy else self._loss_probability
-        )
+        if size > self._large_from:
+            yield from self._repair(size, timeline, probability)
 
     def send(self, size: int, timeline: Timeline) -> Generator[Awaitable, object, None]:
         """Return when a message of `size` bytes has gone through the stack and over the link."""
         if not self._modelled:
             timeline.mark("dds")
             return
-        yield from self._process(size)
+        yield from self._process(size, self._send_ns_per_byte)
         timeline.mark("dds")
-        yield from self._repair(size, timeline, self._loss_probability)
         arrives_ns = self._environment.now + self._link_ns(size)
         yield from self._until(arrives_ns - round(self._transit_ns[size > self._large_from]))
         timeline.mark("transport")
@@ -113,9 +113,9 @@ class DdsStack:
         if time_ns > self._environment.now:
             yield self._environment.timeout(time_ns - self._environment.now)
 
-    def _process(self, size: int) -> Generator[Awaitable, object, None]:
+    def _process(self, size: int, ns_per_byte_large: float) -> Generator[Awaitable, object, None]:
         """Return when the stack has worked on a message of `size` bytes."""
-        ns_per_byte = self._ns_per_byte_large if size > self._large_from else self._ns_per_byte
+        ns_per_byte = ns_per_byte_large if size > self._large_from else self._ns_per_byte
         duration_ns = self._message_ns + size * ns_per_byte
         if self._jitter:
             duration_ns *= self._randomness.lognormvariate(0, self._jitter)
@@ -131,13 +131,11 @@ class DdsStack:
     def _repair(
         self, size: int, timeline: Timeline, loss_probability: float
     ) -> Generator[Awaitable, object, None]:
-        """Return when no fragment of a large message is missing any more."""
-        if size <= self._large_from:
-            return
+        """Return when no fragment of a large message that came in is missing any more."""
         if self._randomness.random() < loss_probability:
             yield self._environment.timeout(round(self._randomness.uniform(0, self._heartbeat_ns)))
             timeline.mark("retransmission")
         while self._randomness.random() < self._nack_probability:
             yield self._environment.timeout(self._nack_delay_ns)
-            yield from self._process(size)
+            yield from self._process(size, self._receive_ns_per_byte)
             timeline.mark("retransmission")

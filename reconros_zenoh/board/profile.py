@@ -67,16 +67,18 @@ class DdsSection(_Section):
     """The ROS 2 communication stack, per message and direction.
 
     A message takes `per_message` and its bytes; one of more than `large_from` goes in fragments of that size
-    and takes `per_byte_large`. Meanwhile the stack keeps one core busy for `core_share` of the time. Times
-    vary by `jitter` (standard deviation of their logarithm). A large message is resent whole with probability
-    `nack_probability`, `nack_delay` after its first copy. With `loss_probability`, or `loss_probability_busy`
-    if it comes while callbacks keep every core busy, it waits for the next heartbeat of its writer, one per
-    `heartbeat_period`. `recovery` is how long the stack needs to go on after a reconfiguration stalled it.
+    and takes `receive_per_byte_large` or `send_per_byte_large`. Meanwhile the stack keeps one core busy for
+    `core_share` of the time. Times vary by `jitter` (standard deviation of their logarithm). A large message
+    that comes in is resent whole with probability `nack_probability`, `nack_delay` after its first copy. With
+    `loss_probability`, or `loss_probability_busy` if it comes while all cores are busy or the stack is
+    stalled, it waits for the next heartbeat of its writer, one per `heartbeat_period`. `recovery` is how long
+    the stack needs to go on after a reconfiguration stalled it.
     """
 
     per_message: Duration
     per_byte: CostPerByte
-    per_byte_large: CostPerByte
+    receive_per_byte_large: CostPerByte
+    send_per_byte_large: CostPerByte
     large_from: Size
     core_share: Share
     jitter: Fraction

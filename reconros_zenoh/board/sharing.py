@@ -68,8 +68,8 @@ class SharedResource:
 
     @property
     def is_saturated(self) -> bool:
-        """Whether the jobs not marked `first` could use all of it."""
-        return sum(job.limit for job in self._jobs if not job.first) >= self._capacity
+        """Whether a job marked `first` that comes now finds all of it in use, or itself held."""
+        return self._holds > 0 or sum(job.limit for job in self._jobs if not job.first) >= self._capacity
 
     def hold_first(self) -> None:
         """Stop serving the jobs marked `first` until as many `release_first`; their work waits."""

@@ -25,7 +25,8 @@ COSTS = {
     "link_byte_ns": 2,
     "dds_message_ns": 100,
     "dds_byte_ns": 3,
-    "dds_byte_large_ns": 5,
+    "dds_byte_received_ns": 5,
+    "dds_byte_sent_ns": 4,
     "large_from": 1000,
 }
 PROFILE = small_profile(**COSTS)  # type: ignore[arg-type] # each value fits its parameter
