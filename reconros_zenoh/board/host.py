@@ -54,8 +54,8 @@ class _Done(Generic[R_co]):
 class Host:
     """Runs the real computation while the model decides when its result is ready.
 
-    In wall time what takes long runs in a pool of threads, what is known to be over soon in line. In virtual time everything runs in line, and a pure kernel computes equal
-    inputs once.
+    In wall time what takes long runs in a pool of threads, what is known to be over soon in line. In virtual
+    time everything runs in line, and a pure kernel computes equal inputs once.
     """
 
     def __init__(
