@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
@@ -169,7 +170,7 @@ def _print_predictions(console: Console, result: Mapping[str, Any]) -> None:
     console.print(
         f"\nBy the transfer times of {predicted['model']}:", style="bold", highlight=False, markup=False
     )
-    table = _table("topic", "rule", "predicted", "SMT HW/SW", "gateway HW/SW", "changes at", "reason")
+    table = _table("topic", "rule", "predicted", "SMT HW/SW", "gateway HW/SW", "changeover", "reason")
     for topic in result["topics"]:
         prediction = topic["predicted"]
         other = prediction["mapping"] != topic["mapping"]
@@ -179,23 +180,25 @@ def _print_predictions(console: Console, result: Mapping[str, Any]) -> None:
             Text(prediction["mapping"], style="bold yellow" if other else ""),
             _times(prediction["smt"]),
             _times(prediction["gateway"]),
-            "-" if prediction["changeover_bytes"] is None else f"{prediction['changeover_bytes']} B",
+            _changeover(prediction["changeover"]),
             prediction["reason"],
         )
     console.print(table)
     _print_sets(console, predicted)
+    print_line = partial(console.print, highlight=False)
+    print_line(f"Edges over the boundary: {predicted['crossings']}.")
     loads = predicted["memif_load"]
-    console.print(
-        f"MEMIF load: {format_share(loads['all_software'])} with every topic in software, "
-        f"{format_share(loads['rule'])} by the rule, {format_share(loads['predicted'])} as predicted. "
-        f"Edges over the boundary: {predicted['crossings']}.",
-        highlight=False,
-    )
-    console.print(
-        "Times in ms, to the slowest subscriber in hardware / in software. changes at: the gateway is the "
-        "faster one from this size on; -: never, up to 100 MB.",
+    if None in loads.values():
+        print_line("The MEMIF load needs size and rate of every topic with an end in hardware.", style="dim")
+    else:
+        print_line(
+            f"MEMIF load: {format_share(loads['all_software'])} with every topic in software, "
+            f"{format_share(loads['rule'])} by the rule, {format_share(loads['predicted'])} as predicted."
+        )
+    print_line(
+        "Times in ms, to the slowest subscriber in hardware / in software. The mean over all pairs of "
+        "publisher and subscriber decides; each subscriber in hardware counts as the slowest.",
         style="dim",
-        highlight=False,
     )
 
 
@@ -210,6 +213,10 @@ def _print_sets(console: Console, sets: Mapping[str, Any]) -> None:
 def _count(edges: Iterable[Edge]) -> str:
     published = [edge.publishes for edge in edges]
     return f"{len(published)} ({published.count(True)} pub, {published.count(False)} sub)"
+
+
+def _changeover(changeover: Mapping[str, Any] | None) -> str:
+    return "-" if changeover is None else f"{changeover['mapping']} from {changeover['bytes']} B"
 
 
 def _times(forecast: Mapping[str, float | None] | None) -> str:

@@ -39,6 +39,7 @@ _LEGEND_TEXTS = {
 }
 _BOX, _LETTER, _GAP, _ROW, _STRIP, _LEGEND = 0.42, 0.085, 0.45, 0.62, 0.35, 6.3
 """Heights of box, row and strips above and below, widths of a letter, a gap and the legend [inch]."""
+_MOST_PIXELS = 30_000  # matplotlib draws no more than 2**16 in a row
 _STYLE: Any = {
     "font.family": "DejaVu Sans",
     "font.size": 9,
@@ -66,7 +67,8 @@ def write_drawing(path: Path, graph: ComputationGraph, mappings: Mapping[str, To
 
         with mpl.rc_context(_STYLE):
             drawn = draw(graph, mappings)
-            drawn.savefig(path, dpi=150, metadata={"Date": None} if suffix == ".svg" else None)
+            dpi = min(150, _MOST_PIXELS / max(drawn.get_size_inches()))
+            drawn.savefig(path, dpi=dpi, metadata={"Date": None} if suffix == ".svg" else None)
     except OSError as error:
         raise UsageError(
             f"{path}: the drawing cannot be written: {error.strerror}. Choose a folder that you may write to."

@@ -126,19 +126,25 @@ def forecast(
     )
 
 
+class Changeover(NamedTuple):
+    """From messages of `size` bytes on, `mapping` is the faster one; below it is the other."""
+
+    size: int
+    mapping: TopicMapping
+
+
 @dataclass(frozen=True, slots=True)
 class Prediction:
     """What the model says of one topic.
 
-    `smt` and `gateway` are None without a size. `changeover` is the size [bytes] from which on the mapping is
-    the other one than for the smallest messages, None if it never changes. A topic with all ends on one side
-    has none of these.
+    `smt` and `gateway` are None without a size, `changeover` where one mapping is the faster one for messages
+    of all sizes. A topic with all ends on one side has none of these.
     """
 
     decision: Decision
     smt: Forecast | None = None
     gateway: Forecast | None = None
-    changeover: int | None = None
+    changeover: Changeover | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,13 +157,9 @@ class Predictions:
 
     @classmethod
     def of(cls, graph: ComputationGraph, profile: Profile, rule: Mapping[str, Decision]) -> Self:
-        """Return for each topic the mapping with the smaller mean transfer time, the SMT if both are equal.
-
-        A topic without a size keeps the mapping of `rule`. So does one with all ends on one side: the
-        measurements behind the model compare SMT and gateway only.
-        """
+        """Return the predictions of a profile for all topics; raise UsageError as `TransferCosts.of`."""
         costs = TransferCosts.of(profile)
-        topics = {topic.name: _predict(graph, costs, topic, rule[topic.name]) for topic in graph.topics}
+        topics = {topic.name: predict_topic(graph, costs, topic, rule[topic.name]) for topic in graph.topics}
         return cls(profile.name, costs, topics)
 
     @property
@@ -166,7 +168,12 @@ class Predictions:
         return {name: prediction.decision.mapping for name, prediction in self.topics.items()}
 
 
-def _predict(graph: ComputationGraph, costs: TransferCosts, topic: Topic, rule: Decision) -> Prediction:
+def predict_topic(graph: ComputationGraph, costs: TransferCosts, topic: Topic, rule: Decision) -> Prediction:
+    """Return the mapping with the smaller mean transfer time, the SMT if both are equal.
+
+    A topic without a size keeps the mapping of `rule`. So does one with all ends on one side: the
+    measurements behind the model compare SMT and gateway only.
+    """
     if len({graph.nodes[edge.node] for edge in topic.edges}) == 1 or not topic.subscribers:
         return Prediction(rule)
 
@@ -182,8 +189,8 @@ def _predict(graph: ComputationGraph, costs: TransferCosts, topic: Topic, rule: 
         return Prediction(unknown, changeover=changeover)
     smt, gateway = compare(topic.size)
     reason = (
-        f"At {topic.size} B the mean over its subscribers is {smt.mean_ns / 1e6:.3f} ms in software "
-        f"and {gateway.mean_ns / 1e6:.3f} ms with a gateway."
+        f"{smt.mean_ns / 1e6:.3f} ms in software, {gateway.mean_ns / 1e6:.3f} ms with a gateway, "
+        f"as a mean at {topic.size} B."
     )
     return Prediction(Decision(_faster(smt, gateway), reason), smt, gateway, changeover)
 
@@ -192,10 +199,10 @@ def _faster(smt: Forecast, gateway: Forecast) -> TopicMapping:
     return TopicMapping.GATEWAY if gateway.mean_ns < smt.mean_ns else TopicMapping.SOFTWARE
 
 
-def _changeover(faster: Callable[[int], TopicMapping]) -> int | None:
-    """Return the smallest size at which another mapping is faster than at SMALLEST.
+def _changeover(faster: Callable[[int], TopicMapping]) -> Changeover | None:
+    """Return the changeover between SMALLEST and LARGEST.
 
-    Times grow linearly with the size, so it changes once or never.
+    Times grow linearly with the size, so there is one or none.
     """
     low, high = SMALLEST, LARGEST
     if faster(low) is faster(high):
@@ -206,7 +213,7 @@ def _changeover(faster: Callable[[int], TopicMapping]) -> int | None:
             low = middle
         else:
             high = middle
-    return high
+    return Changeover(high, faster(high))
 
 
 def memif_load(

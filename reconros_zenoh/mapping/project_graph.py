@@ -65,7 +65,7 @@ def topic_ends(configuration: BuildConfiguration, mapping: Mapping | None = None
 
 
 def read_project_graph(configuration: BuildConfiguration, mapping: Mapping | None = None) -> ComputationGraph:
-    """Return the graph of a project; see `topic_ends` for what is in hardware.
+    """Return the graph of all nodes that have topics; see `topic_ends` for what is in hardware.
 
     A ROS node with callbacks on both sides becomes a node on each. A topic of which the project has only
     publishers, or only subscribers, has its other ends elsewhere, where nothing is in hardware: the node

@@ -82,12 +82,13 @@ def _topic(topic: Topic, decision: Decision) -> dict[str, Any]:
 
 
 def _prediction(prediction: Prediction) -> dict[str, Any]:
+    changeover = prediction.changeover
     return {
         "mapping": prediction.decision.mapping,
         "reason": prediction.decision.reason,
         "smt": _forecast(prediction.smt),
         "gateway": _forecast(prediction.gateway),
-        "changeover_bytes": prediction.changeover,
+        "changeover": changeover and {"bytes": changeover.size, "mapping": changeover.mapping},
     }
 
 
