@@ -111,6 +111,34 @@ class MemifSection(_Section):
     bandwidth: Bandwidth
 
 
+class TopicsSection(_Section):
+    """Software-mapped topics between the nodes of one board (Mapping and Optimizing, Section 4).
+
+    A message takes `publish`, then `notify_hardware` for each subscriber in hardware. A software publisher
+    copies it in first (`copy_in`). Between software nodes it takes `notify_software` and `copy_out` for each
+    subscriber in hardware.
+    """
+
+    publish: Duration
+    notify_hardware: Duration
+    notify_software: Duration
+    copy_in: CostPerByte
+    copy_out: CostPerByte
+
+
+class GatewaySection(_Section):
+    """What a gateway adds: `cancel` takes back its request to the delegate."""
+
+    cancel: Duration
+
+
+class HmtSection(_Section):
+    """Hardware-mapped topics: a message takes `overhead` and its bytes on the stream."""
+
+    overhead: Duration
+    bandwidth: Bandwidth
+
+
 class OsifSection(_Section):
     """The operating system interface: one call through the delegate thread."""
 
@@ -155,6 +183,9 @@ class Model(_Section):
     osif: OsifSection
     bitstreams: Annotated[tuple[BitstreamSection, ...], Field(min_length=1)]
     callbacks: dict[str, CallbackSection]
+    topics: TopicsSection | None = None
+    gateway: GatewaySection | None = None
+    hmt: HmtSection | None = None
 
 
 class Profile(_Section):

@@ -12,15 +12,9 @@ import typer
 from rich.console import Console
 
 from reconros_zenoh.board.control import ask_status
+from reconros_zenoh.cli.options import ENDPOINT, AsJson, Domain, Router
 from reconros_zenoh.experiments.roundtrip import application_folder
 from reconros_zenoh.transport.zenoh import ZenohRouter, ZenohTransport
-
-_ENDPOINT = "tcp/127.0.0.1:7447"
-Router = Annotated[
-    str, typer.Option(metavar="ENDPOINT", envvar="RECONROS_ROUTER", help="The Zenoh router to connect to.")
-]
-Domain = Annotated[int, typer.Option(min=0, max=232, envvar="ROS_DOMAIN_ID", help="The ROS domain.")]
-AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
 
 
 class ClientName(StrEnum):
@@ -39,7 +33,7 @@ def router(
         typer.Option(
             metavar="ENDPOINT", help="Where to listen; tcp/[::]:7447 takes sessions of other hosts too."
         ),
-    ] = _ENDPOINT,
+    ] = ENDPOINT,
 ) -> None:
     """Run a Zenoh router until Ctrl-C; any rmw_zenoh router serves as well."""
     endings = {signal.SIGINT, signal.SIGTERM}
@@ -62,7 +56,7 @@ def board(
         str, typer.Option(metavar="NAME|FILE", help="The kind of board; native models nothing.")
     ] = "miniitx-zynq7100",
     name: Annotated[str, typer.Option(help="The board's name in the network.")] = "board0",
-    router: Router = _ENDPOINT,
+    router: Router = ENDPOINT,
     domain: Domain = 0,
     seed: Annotated[int, typer.Option(help="Seed of what is random in the model.")] = 0,
     bitstreams: Annotated[
@@ -92,7 +86,7 @@ def board(
 def client(
     name: Annotated[ClientName, typer.Argument(help="Which client.")],
     requests: Annotated[int, typer.Option(min=1, help="How many round trips to make.")] = 100,
-    router: Router = _ENDPOINT,
+    router: Router = ENDPOINT,
     domain: Domain = 0,
     limit: Annotated[
         float, typer.Option(min=0.001, metavar="SECONDS", help="After this time an answer is lost.")
@@ -120,7 +114,7 @@ def client(
 
 def status(
     name: Annotated[str, typer.Argument(help="The board, or `router`.")] = "board0",
-    router: Router = _ENDPOINT,
+    router: Router = ENDPOINT,
     as_json: AsJson = False,
 ) -> None:
     """Show what a board is doing; exit status 2 when it does not answer."""

@@ -25,6 +25,7 @@ _VERBS = {
     "client": ("daemons", "client"),
     "status": ("daemons", "status"),
     "build": ("build", "build"),
+    "map": ("map", "map_communication"),
 }
 """Each verb with its module in this package and its name there, in the order of `reconros --help`."""
 
