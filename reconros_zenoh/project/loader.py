@@ -12,7 +12,7 @@ from reconros_zenoh.board.board import SlotPlan
 from reconros_zenoh.errors import FileError, UsageError
 from reconros_zenoh.project.build_cfg import read_build_cfg
 from reconros_zenoh.project.interfaces import read_interfaces
-from reconros_zenoh.project.mapping_file import read_mapping
+from reconros_zenoh.project.mapping_file import Mapping, bitstream_slots, read_mapping
 from reconros_zenoh.project.resources import slot_resources
 from reconros_zenoh.ros.types import TypeRegistry
 
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from reconros_zenoh.project.application import Application
     from reconros_zenoh.project.build_cfg import BuildConfiguration
     from reconros_zenoh.project.interfaces import Interfaces
-    from reconros_zenoh.project.mapping_file import Mapping
 
 
 @dataclass(frozen=True)
@@ -66,15 +65,25 @@ class Project:
                 raise FileError(path, error.line, error.problem, error.remedy) from error
         return registry
 
-    def mapping(self, name_or_file: str) -> Mapping:
-        """Return the mapping of that name in the project's folder `mappings`, or the one in that file."""
+    def mapping(self, name_or_file: str | None) -> Mapping:
+        """Return the mapping of that name in the project's folder `mappings`, or the one in that file.
+
+        None stands for the first in the folder, or, if there is none, for the default.
+        """
+        if name_or_file is None:
+            shipped = self._mappings()
+            if not shipped:
+                return Mapping.default(self.configuration)
+            name_or_file = next(iter(shipped))
         return read_mapping(
-            self.mapping_path(name_or_file), self.callbacks, [slot.slot_id for slot in self.slots]
+            self.mapping_path(name_or_file),
+            bitstream_slots(self.configuration),
+            [slot.slot_id for slot in self.slots],
         )
 
     def mapping_path(self, name_or_file: str) -> Path:
         """Return where the mapping stands; raise UsageError when there is none of that name."""
-        shipped = {path.stem: path for path in sorted((self.folder / "mappings").glob("*.toml"))}
+        shipped = self._mappings()
         if name_or_file in shipped:
             return shipped[name_or_file]
         path = type(self.folder)(name_or_file)
@@ -84,15 +93,16 @@ class Project:
             )
         return path
 
+    def _mappings(self) -> dict[str, Path]:
+        return {path.stem: path for path in sorted((self.folder / "mappings").glob("*.toml"))}
+
     def bitstreams(self, profile: Profile) -> list[Bitstream]:
         """Return the bitstream of each callback for each slot it can be built for."""
         sizes = {slot.slot_id: profile.bitstream_size(slot.lut, slot.dsp, slot.bram36) for slot in self.slots}
         return [
-            Bitstream(slot, thread.name, sizes[slot])
-            for thread in self.configuration.threads
-            if thread.hardware is not None
-            for slot in thread.slots
-            if slot in sizes
+            Bitstream(slot, callback, sizes[slot])
+            for callback, slots in bitstream_slots(self.configuration).items()
+            for slot in slots
         ]
 
 
