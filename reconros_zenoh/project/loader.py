@@ -15,7 +15,6 @@ from reconros_zenoh.project.main_file import load_main, running_project
 from reconros_zenoh.project.mapping_file import Mapping, bitstream_slots, read_mapping
 from reconros_zenoh.project.resources import slot_resources
 from reconros_zenoh.project.text_file import read_text_file
-from reconros_zenoh.ros.types import TypeRegistry
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -26,6 +25,7 @@ if TYPE_CHECKING:
     from reconros_zenoh.project.application import Application
     from reconros_zenoh.project.build_cfg import BuildConfiguration
     from reconros_zenoh.project.interfaces import Interfaces
+    from reconros_zenoh.ros.types import TypeRegistry
 
 
 @dataclass(frozen=True)
@@ -90,14 +90,7 @@ class Project:
 
     @cached_property
     def _types(self) -> TypeRegistry:
-        registry = TypeRegistry()
-        for name, text in self.interfaces.texts.items():
-            try:
-                registry.add(name, text)
-            except FileError as error:
-                path = self.interfaces.paths[name]
-                raise FileError(path, error.line, error.problem, error.remedy) from error
-        return registry
+        return self.interfaces.registry()
 
     def mapping(self, name_or_file: str | None) -> Mapping:
         """Return the mapping of that name in the project's folder `mappings`, or the one in that file.
