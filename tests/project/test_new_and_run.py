@@ -61,14 +61,9 @@ def test_it_runs_at_once_in_the_first_mapping_of_its_folder(
 ) -> None:
     status = run(blink, "--seconds", 1.05)
     assert status["profile"] == "native"
-    assert status["callbacks"]["count"] == {
-        "kind": "TMR",
-        "software": False,
-        "slots": [0],
-        "calls": 10,
-        "failed": 0,
-        "dropped": 0,
-    }
+    count = status["callbacks"]["count"]
+    assert (count["kind"], count["software"], count["slots"]) == ("TMR", False, [0])
+    assert (count["calls"], count["failed"], count["dropped"]) == (10, 0, 0)
     assert status["slots"][0]["holds"] == "count"
     assert not caplog.records
 
