@@ -48,7 +48,7 @@ def running_project(folder: Path) -> Iterator[None]:
     sys.path.insert(0, str(root))
     try:
         yield
-    except (FileError, KeyboardInterrupt):
+    except FileError:
         raise
     except UsageError as error:
         path, line = _place(error, root)
