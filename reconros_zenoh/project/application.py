@@ -124,15 +124,15 @@ class Application:
         if place.software:
             if software is None:
                 raise UsageError(
-                    f"callback {name!r} is mapped to software, but no `software` is given. Give it, or map the "
-                    "callback to reconfigurable slots."
+                    f"callback {name!r} is mapped to software, but no `software` is given. Give it, or "
+                    "map the callback to reconfigurable slots."
                 )
             executor.add_sw_callback(name, kind, source, software, check)
         if place.slots:
             if hardware is None:
                 raise UsageError(
-                    f"callback {name!r} is mapped to hardware, but no `hardware` is given. Give it, or map the "
-                    "callback to software."
+                    f"callback {name!r} is mapped to hardware, but no `hardware` is given. Give it, or "
+                    "map the callback to software."
                 )
             executor.add_hw_callback(name, place.slots, kind, source, hardware, check)
 
