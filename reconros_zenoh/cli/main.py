@@ -24,6 +24,9 @@ _VERBS = {
     "board": ("daemons", "board"),
     "client": ("daemons", "client"),
     "status": ("daemons", "status"),
+    "new": ("new", "new"),
+    "check": ("check", "check"),
+    "run": ("run", "run"),
     "build": ("build", "build"),
     "map": ("map", "map_communication"),
 }

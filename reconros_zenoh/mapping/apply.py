@@ -82,7 +82,9 @@ def _switched(configuration: BuildConfiguration, ends: Iterable[TopicEnd]) -> It
     A numbered group makes several resources out of one line; all of them change or none.
     """
     path = configuration.path
-    options = {option.line: option for section in read_sections(path) for option in section.options.values()}
+    options = {
+        option.line: option for section in read_sections(path, []) for option in section.options.values()
+    }
     resources_in = [resource.line for resource in configuration.resources]
     streams = {software: hardware for hardware, software in gateway_topics(configuration).items()}
     by_line: defaultdict[int, list[TopicEnd]] = defaultdict(list)

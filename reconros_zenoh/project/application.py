@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from reconros_zenoh.board.endpoints import ServiceSource, SubscriptionSource, TimerSource, TopicWriter
+from reconros_zenoh.board.executor import Executor
 from reconros_zenoh.errors import UsageError
+from reconros_zenoh.executor.callbacks import CallbackKind
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
     from pathlib import Path
 
     from reconros_zenoh.board.board import Board
+    from reconros_zenoh.board.callback import HardwareCallback, SoftwareCallback
     from reconros_zenoh.board.endpoints import Source
-    from reconros_zenoh.board.executor import Executor
     from reconros_zenoh.project.loader import Project
     from reconros_zenoh.project.mapping_file import Mapping
     from reconros_zenoh.project.resource_groups import Resource
@@ -21,6 +24,14 @@ if TYPE_CHECKING:
 
 
 T = TypeVar("T")
+_KINDS = {
+    "rostmr": CallbackKind.TMR,
+    "rossub": CallbackKind.SUB,
+    "rossrvs": CallbackKind.SRV,
+    "rosactions": CallbackKind.SRV,
+    "rossrvc": CallbackKind.CLT,
+    "rosactionc": CallbackKind.CLT,
+}
 
 
 class Application:
@@ -38,6 +49,7 @@ class Application:
         self.types = types
         self.bitstreams = bitstreams
         self.executor: Executor | None = None
+        self._mapped: Executor | None = None
         self._resources = {
             (resource.group, resource.name): resource for resource in project.configuration.resources
         }
@@ -79,15 +91,71 @@ class Application:
             _required(resource.ros_name),
         )
 
-    def spin(self, executor: Executor) -> None:
-        """Start the executor's workers; it is the one that the board reports on."""
-        self.executor = executor
-        executor.spin()
+    def register(
+        self,
+        name: str,
+        resource: str,
+        *,
+        software: SoftwareCallback | None = None,
+        hardware: HardwareCallback | None = None,
+        check: Callable[[Any], None] | None = None,
+    ) -> None:
+        """Let the callback `name` of build.cfg run where the mapping wants it, whenever `resource` is ready.
+
+        That is a subscription, service or timer of its resource groups; `check` raises BadMessageError for
+        bad messages. The executor is the one that the mapping describes; `spin` starts it.
+        """
+        threads = {thread.name: thread for thread in self.project.configuration.threads}
+        if name not in threads:
+            raise UsageError(
+                f"build.cfg has no callback {name!r}. Add `[ReconosThread@{name}]`, or give one of "
+                f"{', '.join(threads)}."
+            )
+        groups = threads[name].resource_groups
+        group = next((group for group in groups if (group, resource) in self._resources), None)
+        if group is None:
+            raise UsageError(
+                f"callback {name!r} has no resource {resource!r} in its groups, {', '.join(groups)}."
+            )
+        source = self.source(group, resource)
+        kind = _KINDS[self._resources[group, resource].type]
+        executor = self._mapped = self._mapped or self._mapped_executor()
+        place = self.mapping.callbacks[name]
+        if place.software:
+            if software is None:
+                raise UsageError(
+                    f"callback {name!r} is mapped to software, but no `software` is given. Give it, or "
+                    "map the callback to reconfigurable slots."
+                )
+            executor.add_sw_callback(name, kind, source, software, check)
+        if place.slots:
+            if hardware is None:
+                raise UsageError(
+                    f"callback {name!r} is mapped to hardware, but no `hardware` is given. Give it, or "
+                    "map the callback to software."
+                )
+            executor.add_hw_callback(name, place.slots, kind, source, hardware, check)
+
+    def spin(self, executor: Executor | None = None) -> None:
+        """Start the workers of an executor of one's own or of the one that `register` has filled.
+
+        It is the one that the board reports on.
+        """
+        self.executor = executor or self._mapped
+        if self.executor is None:
+            raise UsageError("app.spin() without a callback. Call app.register(...) first.")
+        self.executor.spin()
 
     def close(self) -> None:
         """Take the nodes out of the graph."""
         for node in self._nodes.values():
             node.close()
+
+    def _mapped_executor(self) -> Executor:
+        mapping = self.mapping
+        return Executor(
+            self.board, mapping.software_workers, mapping.hardware_workers, self.bitstreams, mapping.executor
+        )
 
     def _resource(self, group: str, name: str) -> Resource:
         try:

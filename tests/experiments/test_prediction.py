@@ -1,4 +1,4 @@
-"""What the shipped profile promises of the Zynq board: quartiles of 15 cells, and where reconfiguration shows.
+"""What the shipped profile promises of the Zynq board: quartiles, and where reconfiguration shows.
 
 1000 requests under five seeds, compared as the clients of the paper logged their times, modulo 1 s.
 """
