@@ -26,11 +26,15 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """What a worker takes: the message of the callback (None for a timer) and its timeline so far."""
+    """What a worker takes: the message of the callback (None for a timer) and its timeline so far.
+
+    `message_type` is None for what has no place in memory as a C struct.
+    """
 
     message: Any
     timeline: Timeline
     responder: Responder | None = None
+    message_type: MessageType | None = None
 
 
 class Source(Protocol):
@@ -62,8 +66,9 @@ class Reader:
     It keeps the last `depth` messages (KEEP_LAST) and counts in `dropped` what it pushed out.
     """
 
-    def __init__(self, board: Board, depth: int) -> None:
+    def __init__(self, board: Board, message_type: MessageType, depth: int) -> None:
         self._board = board
+        self._message_type = message_type
         self._queue: deque[Event] = deque(maxlen=depth)
         self._stream: Stream[tuple[Received, Timeline]] = Stream(self._receive, depth)
         self._overwritten = 0
@@ -100,7 +105,7 @@ class Reader:
         yield from self._board.dds.receive(received.size, received.transit_ns, timeline)
         if len(self._queue) == self._queue.maxlen:
             self._overwritten += 1
-        self._queue.append(Event(received.message, timeline, received.responder))
+        self._queue.append(Event(received.message, timeline, received.responder, self._message_type))
         self._on_ready()
 
 
@@ -111,7 +116,7 @@ class SubscriptionSource(Reader):
         self, board: Board, node: Node, message_type: MessageType, topic: str, qos: QosProfile | None = None
     ) -> None:
         self._qos = qos or QosProfile()
-        super().__init__(board, self._qos.depth)
+        super().__init__(board, message_type, self._qos.depth)
         self._node = node
         self._type = message_type
         self._topic = topic
@@ -126,7 +131,7 @@ class ServiceSource(Reader):
     """A service server: ready while a request waits."""
 
     def __init__(self, board: Board, node: Node, service_type: ServiceType, name: str) -> None:
-        super().__init__(board, QosProfile().depth)
+        super().__init__(board, service_type.request, QosProfile().depth)
         self._node = node
         self._type = service_type
         self._name = name

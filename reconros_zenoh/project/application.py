@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, TypeVar, cast
+
+import numpy as np
 
 from reconros_zenoh.board.endpoints import ServiceSource, SubscriptionSource, TimerSource, TopicWriter
+from reconros_zenoh.board.os_resources import Condition, Mailbox, Mutex, Semaphore, SharedMemory
 from reconros_zenoh.errors import UsageError
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
     from pathlib import Path
 
     from reconros_zenoh.board.board import Board
@@ -42,6 +46,7 @@ class Application:
             (resource.group, resource.name): resource for resource in project.configuration.resources
         }
         self._nodes: dict[str, Node] = {}
+        self._os_resources: dict[tuple[str, str], object] = {}
 
     def source(self, group: str, name: str) -> Source:
         """Return the end of a topic, service or timer that makes a callback ready."""
@@ -69,15 +74,44 @@ class Application:
 
     def writer(self, group: str, name: str) -> TopicWriter:
         """Return the publisher of that name."""
-        resource = self._resource(group, name)
-        if resource.type != "rospub":
-            raise UsageError(f"resource {name!r} of group {group!r} is a {resource.type}, not a rospub.")
+        resource = self._resource_of(group, name, "rospub")
         return TopicWriter(
             self.board,
             self._node(resource),
             self.types.message(_required(resource.interface)),
             _required(resource.ros_name),
         )
+
+    def mbox(self, group: str, name: str) -> Mailbox:
+        """Return the mailbox of that name, the same one each time."""
+        return self._shared(
+            group, name, "mbox", lambda r: Mailbox(self.board.environment, _required(r.number))
+        )
+
+    def mutex(self, group: str, name: str) -> Mutex:
+        """Return the mutex of that name, the same one each time."""
+        return self._shared(group, name, "mutex", lambda _: Mutex(self.board.environment))
+
+    def cond(self, group: str, name: str) -> Condition:
+        """Return the condition of that name, the same one each time."""
+        return self._shared(
+            group, name, "cond", lambda r: Condition(self.board.environment, self.mutex(group, r.args[0]))
+        )
+
+    def sem(self, group: str, name: str) -> Semaphore:
+        """Return the semaphore of that name, the same one each time."""
+        return self._shared(
+            group, name, "sem", lambda r: Semaphore(self.board.environment, _required(r.number))
+        )
+
+    def mem(self, group: str, name: str) -> SharedMemory:
+        """Return the memory of that name, the same one each time, zero at first."""
+
+        def allocate(resource: Resource) -> SharedMemory:
+            words = np.zeros(_required(resource.number), np.uint32)
+            return SharedMemory(self.board.memory.map(words.view(np.uint8)), words)
+
+        return self._shared(group, name, "mem", allocate)
 
     def spin(self, executor: Executor) -> None:
         """Start the executor's workers; it is the one that the board reports on."""
@@ -88,6 +122,17 @@ class Application:
         """Take the nodes out of the graph."""
         for node in self._nodes.values():
             node.close()
+
+    def _shared(self, group: str, name: str, kind: str, make: Callable[[Resource], T]) -> T:
+        if (group, name) not in self._os_resources:
+            self._os_resources[group, name] = make(self._resource_of(group, name, kind))
+        return cast("T", self._os_resources[group, name])
+
+    def _resource_of(self, group: str, name: str, kind: str) -> Resource:
+        resource = self._resource(group, name)
+        if resource.type != kind:
+            raise UsageError(f"resource {name!r} of group {group!r} is a {resource.type}, not a {kind}.")
+        return resource
 
     def _resource(self, group: str, name: str) -> Resource:
         try:

@@ -15,8 +15,8 @@ from reconros_zenoh.executor.callbacks import CallbackKind
 from reconros_zenoh.ros.qos import QosProfile
 
 if TYPE_CHECKING:
-    from reconros_zenoh.board.callback import SoftwareContext
     from reconros_zenoh.board.profile import Profile
+    from reconros_zenoh.board.software import SoftwareContext
 
 
 class Subscriber:
