@@ -9,7 +9,7 @@ from board_daemon.hosting import HostedBoard
 from reconros_zenoh.board.control import ControlServer, claim_name
 from reconros_zenoh.clock.virtual import succeed_once
 from reconros_zenoh.clock.wall import WallEnvironment, keep_time
-from reconros_zenoh.transport.memory import tune_malloc
+from reconros_zenoh.transport.memory import tune_memory
 from reconros_zenoh.transport.zenoh import ZenohTransport
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ def run_board(
     Raise TransportError without a router, UsageError when the name is taken.
     """
     keep_time()
-    tune_malloc()
+    tune_memory()
     environment = WallEnvironment()
     stop = environment.event()
     for number in (signal.SIGINT, signal.SIGTERM):

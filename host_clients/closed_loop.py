@@ -48,7 +48,8 @@ class ClosedLoop:
         self._on_round_trip = on_round_trip
         self._matched = environment.event()
         self._arrival: simpy.Event | None = None
-        self._wait = 0
+        self._deadline_ns = 0
+        self._watched = False
         self._last_arrival_ns = 0
         self._lost: list[int] = []
         self.warm = environment.event()
@@ -88,10 +89,10 @@ class ClosedLoop:
 
     def _next_arrival(self, deadline_ns: int) -> Generator[simpy.Event, Any, tuple[int, Any] | None]:
         """Return when the next answer arrived and the answer, or None at the deadline."""
-        self._wait += 1
+        self._deadline_ns = deadline_ns
         self._arrival = self._environment.event()
-        # It knows the wait by its number: the event would keep the answer in memory until the deadline.
-        self._environment.call_later(max(0, deadline_ns - self._environment.now), self._expire, self._wait)
+        if not self._watched:
+            self._watch()
         arrival: tuple[int, Any] | None = yield self._arrival
         return arrival
 
@@ -105,9 +106,14 @@ class ClosedLoop:
         arrived_ns = self._environment.clock_ns()
         self._environment.post(self._arrived, (arrived_ns, message))
 
-    def _expire(self, wait: int) -> None:
-        """End the wait of that number, unless it has ended."""
-        if wait == self._wait:
+    def _watch(self) -> None:
+        """End the present wait at its deadline: one call at a time, which looks when the next is due."""
+        waiting = self._arrival is not None
+        left_ns = self._deadline_ns - self._environment.now
+        self._watched = waiting and left_ns > 0
+        if self._watched:
+            self._environment.call_later(left_ns, self._watch)
+        elif waiting:
             self._arrived(None)
 
     def _arrived(self, arrival: tuple[int, object] | None) -> None:

@@ -13,7 +13,7 @@ from reconros_zenoh.clock.wall import WallEnvironment, keep_time
 from reconros_zenoh.errors import TransportError
 from reconros_zenoh.rmw.node import Context
 from reconros_zenoh.ros.types import TypeRegistry
-from reconros_zenoh.transport.memory import tune_malloc
+from reconros_zenoh.transport.memory import tune_memory
 from reconros_zenoh.transport.zenoh import ZenohTransport
 
 if TYPE_CHECKING:
@@ -49,7 +49,7 @@ def run_client(options: ClientOptions, on_round_trip: Callable[[RoundTrip], None
     Raise TransportError when there is no router, or when no board answers within `wait_s`.
     """
     keep_time()
-    tune_malloc()
+    tune_memory()
     environment = WallEnvironment()
     stop = environment.event()
     for number in (signal.SIGINT, signal.SIGTERM):

@@ -50,6 +50,7 @@ class SharedResource:
         self._per_job = per_job
         self._jobs: list[_Job] = []
         self._holds = 0
+        self._contended = False
 
     def serve(
         self, work: float, limit: float | None = None, *, first: bool = False
@@ -62,7 +63,7 @@ class SharedResource:
             return
         job = _Job(work, self._environment.now, self._per_job if limit is None else limit, first=first)
         self._jobs.append(job)
-        self._share()
+        self._share(job)
         yield job
 
     def hold_first(self) -> None:
@@ -75,13 +76,19 @@ class SharedResource:
         self._holds -= 1
         self._share()
 
-    def _share(self) -> None:
-        """Give every job its rate, and a new completion where that changes."""
-        if not self._holds and sum(job.limit for job in self._jobs) <= self._capacity:
-            for job in self._jobs:
+    def _share(self, new: _Job | None = None) -> None:
+        """Give every job its rate, and a new completion where that changes; `new` is the one that came."""
+        demand = 0.0
+        for job in self._jobs:
+            demand += job.limit
+        if not self._holds and demand <= self._capacity:
+            # Where every other job has all it can use already, nothing changes for them.
+            for job in self._jobs if self._contended else (new,) if new else ():
                 if job.rate != job.limit:
                     self._plan(job, job.limit)
+            self._contended = False
             return
+        self._contended = True
         left = self._capacity
         for group in ([job for job in self._jobs if job.first], [job for job in self._jobs if not job.first]):
             # Whoever can use less than an equal share leaves the rest to the others.

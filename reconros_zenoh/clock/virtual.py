@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import simpy
 
@@ -33,14 +33,26 @@ class VirtualEnvironment(simpy.Environment):
         self.call_later(0, function, *arguments)
 
     def call_later(self, delay_ns: int, function: Callable[..., object], *arguments: object) -> None:
-        """Have `function(*arguments)` called by the event loop after `delay_ns`."""
-        timeout = self.timeout(delay_ns)
-        assert timeout.callbacks is not None
+        """Have `function(*arguments)` called by the event loop after `delay_ns`, which is not negative."""
+        if delay_ns < 0:
+            raise ValueError(f"Negative delay {delay_ns}")
+        # It has what the event loop asks of an event.
+        self.schedule(cast("simpy.Event", _Call(function, arguments)), delay=delay_ns)
 
-        def call(_: simpy.Event) -> None:
-            function(*arguments)
 
-        timeout.callbacks.append(call)
+class _Call:
+    """A call that is due at some time: an event whose only callback is itself, at half the cost of one."""
+
+    __slots__ = ("_arguments", "_function", "callbacks")
+    _ok = True
+
+    def __init__(self, function: Callable[..., object], arguments: tuple[object, ...]) -> None:
+        self._function = function
+        self._arguments = arguments
+        self.callbacks: tuple[_Call] | None = (self,)
+
+    def __call__(self, _: object) -> None:
+        self._function(*self._arguments)
 
 
 def succeed_once(event: simpy.Event) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ctypes
-import gc
 import sys
 import threading
 import time
@@ -27,7 +26,6 @@ _TURN_NS = 1_000_000
 _NAP_NS = 1_000_000_000
 _PR_SET_TIMERSLACK = 29
 _LAGS_KEPT = 1 << 16
-_OBJECTS_BETWEEN_COLLECTIONS = 50_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,11 +156,9 @@ class WallEnvironment(VirtualEnvironment):
 def keep_time() -> None:
     """Make this process punctual; called once by a daemon before it starts any thread.
 
-    Linux delays timers by up to 50 us to save wake-ups, CPython hands the interpreter over every 5 ms only,
-    and its garbage collector would look through everything that was imported time and again.
+    Linux delays timers by up to 50 us to save wake-ups, and CPython hands the interpreter over every 5 ms
+    only.
     """
-    gc.freeze()
-    gc.set_threshold(_OBJECTS_BETWEEN_COLLECTIONS)
     sys.setswitchinterval(0.00005)
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PR_SET_TIMERSLACK, 1, 0, 0, 0)

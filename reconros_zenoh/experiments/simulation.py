@@ -14,7 +14,7 @@ from host_clients.suite import exchange
 from reconros_zenoh.clock.virtual import VirtualEnvironment, succeed_once
 from reconros_zenoh.errors import TransportError
 from reconros_zenoh.rmw.node import Context
-from reconros_zenoh.transport.memory import tune_malloc
+from reconros_zenoh.transport.memory import tune_memory
 from reconros_zenoh.transport.simulated import SimulatedNetwork
 
 if TYPE_CHECKING:
@@ -41,7 +41,7 @@ class Simulation:
 
     def __init__(self, types: TypeRegistry) -> None:
         """`types` are those of the clients."""
-        tune_malloc()
+        tune_memory()
         self.environment = VirtualEnvironment()
         self._sessions = count(1)
         self._types = types

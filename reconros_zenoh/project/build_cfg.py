@@ -1,7 +1,8 @@
 """The ReconROS project file `build.cfg`: the board, its slots, and what each callback needs.
 
-The grammar is that of ReconROS (ReconROS Executor, Section IV, Listing 1). What this project does not know is
-reported in `warnings` and left out, so that a file written for the FPGA tool flow reads as it is.
+The grammar is that of ReconROS (ReconROS Executor, Section IV, Listing 1). What this project does not know
+is left out with a line in `warnings`, and what is missing but not needed here is warned of, so that a file
+written for the FPGA tool flow reads as it is.
 """
 
 from __future__ import annotations
@@ -59,7 +60,7 @@ _KNOWN_OPTIONS = {
 
 @dataclass(frozen=True)
 class TargetBoard:
-    """The board a project is built for, as the tool flow names it."""
+    """The board a project is built for, as the tool flow names it; a file may give no revision."""
 
     board: str
     revision: str
@@ -128,27 +129,33 @@ class BuildConfiguration:
 
 def read_build_cfg(path: Path) -> BuildConfiguration:
     """Return what the project file says, checked; `FileError` names the line of the first mistake."""
-    sections = read_sections(path)
-    warnings = list(_unknown(sections))
+    warnings: list[str] = []
+    sections = read_sections(path, warnings)
+    warnings += _unknown(sections)
 
     def of_kind(kind: str) -> list[Section]:
         return [section for section in sections if section.kind == kind]
 
     general = _general(path, of_kind("General"), warnings)
     partial_reconfiguration = general.boolean("PartialReconfiguration", default=False)
-    clocks = [read_clock(name, section) for name, section in unique_names(of_kind("Clock"))]
+    clocks = [read_clock(name, section, warnings) for name, section in unique_names(of_kind("Clock"))]
     clock_names = [clock.name for clock in clocks]
-    slots = read_slots(of_kind("HwSlot"), clock_names, partial_reconfiguration=partial_reconfiguration)
+    slots = read_slots(
+        of_kind("HwSlot"), clock_names, warnings, partial_reconfiguration=partial_reconfiguration
+    )
     groups = read_resource_groups(of_kind("ResourceGroup"), warnings)
     threads = [
-        _thread(name, section, slots, groups) for name, section in unique_names(of_kind("ReconosThread"))
+        _thread(name, section, slots, groups, warnings)
+        for name, section in unique_names(of_kind("ReconosThread"))
     ]
-    gateways = [_gateway(name, section, slots) for name, section in unique_names(of_kind("ROSGateway"))]
+    gateways = [
+        _gateway(name, section, slots, warnings) for name, section in unique_names(of_kind("ROSGateway"))
+    ]
     warnings += _mismatches(slots, threads, path, partial_reconfiguration=partial_reconfiguration)
     return BuildConfiguration(
         path=path,
         name=general.value("Name") or path.absolute().parent.name,
-        board=_target_board(general),
+        board=_target_board(general, warnings),
         part=general.value("TargetPart"),
         os=general.value("TargetOS"),
         partial_reconfiguration=partial_reconfiguration,
@@ -194,6 +201,8 @@ def _mismatches(
     for thread in threads:
         if thread.hardware is None and thread.software is None:
             yield f"{path}:{thread.line}: {thread.name} has neither HwSource nor SwSource, so it cannot run."
+        if thread.hardware is not None and not thread.slots:
+            yield f"{path}:{thread.line}: {thread.name} has a HwSource but no Slot to be built for."
 
 
 def _general(path: Path, sections: list[Section], warnings: list[str]) -> Section:
@@ -207,21 +216,27 @@ def _general(path: Path, sections: list[Section], warnings: list[str]) -> Sectio
         raise sections[1].error(
             f"[General] stands twice, first in line {sections[0].line}.", "Put its options under one heading."
         )
-    sections[0].required("Name")
+    if sections[0].value("Name") is None:
+        warnings.append(
+            f"{path}:{sections[0].line}: [General] has no Name; the project is named after its folder."
+        )
     return sections[0]
 
 
-def _target_board(general: Section) -> TargetBoard | None:
-    option = general.options.get("TargetBoard")
-    if option is None:
+def _target_board(general: Section, warnings: list[str]) -> TargetBoard | None:
+    value = general.value("TargetBoard")
+    if value is None:
         return None
-    words = re.split(r"[\s,]+", option.value)
-    if len(words) != 2 or not all(words):
-        raise option.error(
-            f"TargetBoard is {option.value!r}, not a board and its revision.",
-            "Write `TargetBoard = zedboard,d`.",
-        )
-    return TargetBoard(*words)
+    option = general.required("TargetBoard")
+    match re.findall(r"[^\s,]+", value):
+        case [board, revision]:
+            return TargetBoard(board, revision)
+        case [board]:
+            warnings.append(f"{option.path}:{option.line}: TargetBoard {board} has no revision.")
+            return TargetBoard(board, "")
+    raise option.error(
+        f"TargetBoard is {value!r}, not a board and its revision.", "Write `TargetBoard = zedboard,d`."
+    )
 
 
 def _group_names(section: Section, groups: Collection[str]) -> tuple[str, ...]:
@@ -238,14 +253,17 @@ def _group_names(section: Section, groups: Collection[str]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(listed))
 
 
-def _thread(name: str, section: Section, slots: Collection[HwSlot], groups: Collection[str]) -> ReconosThread:
-    hardware = section.value("HwSource")
-    if hardware is not None:
-        section.required("Slot")
+def _thread(
+    name: str,
+    section: Section,
+    slots: Collection[HwSlot],
+    groups: Collection[str],
+    warnings: list[str],
+) -> ReconosThread:
     return ReconosThread(
         name=name,
-        slots=read_slot_ids(section, slots),
-        hardware=hardware,
+        slots=read_slot_ids(section, slots, warnings),
+        hardware=section.value("HwSource"),
         software=section.value("SwSource"),
         resource_groups=_group_names(section, groups),
         use_mem=section.boolean("UseMem", default=True),
@@ -255,7 +273,7 @@ def _thread(name: str, section: Section, slots: Collection[HwSlot], groups: Coll
     )
 
 
-def _gateway(name: str, section: Section, slots: Collection[HwSlot]) -> RosGateway:
+def _gateway(name: str, section: Section, slots: Collection[HwSlot], warnings: list[str]) -> RosGateway:
     section.required("Slot")
     hw_topic, sw_topic, written = (section.required(key) for key in ("HWTopic", "SWTopic", "MsgType"))
     try:
@@ -264,7 +282,7 @@ def _gateway(name: str, section: Section, slots: Collection[HwSlot]) -> RosGatew
         raise written.error(str(error), "Write for example `MsgType = sensor_msgs/Image`.") from None
     return RosGateway(
         name=name,
-        slots=read_slot_ids(section, slots),
+        slots=read_slot_ids(section, slots, warnings),
         hw_topic=hw_topic.value.strip('"'),
         sw_topic=sw_topic.value.strip('"'),
         type=message_type,

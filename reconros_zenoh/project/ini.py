@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from reconros_zenoh.errors import FileError
 from reconros_zenoh.project.numbered_names import NumberedName, parse_numbered_names
-from reconros_zenoh.project.text_file import read_text_file
+from reconros_zenoh.project.text_file import read_old_text_file
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -21,6 +21,12 @@ if TYPE_CHECKING:
 _AT = re.compile(r"@|\(at\)")
 # An indented line of this form is an indented option; any other indented line goes on with the value above.
 _INDENTED_OPTION = re.compile(r"[A-Za-z_%][\w%]*\s*=")
+# `name: value` as configparser has it; the blank tells it from a rectangle of sites that goes on a line.
+_COLON_OPTION = re.compile(r"([A-Za-z_%][\w%]*)\s*:(?:\s+|\Z)([^=]*)")
+# A comment behind a value: the mark after a blank and outside quotes.
+_TRAILING_COMMENT = re.compile(r"""((?:[^"]|"[^"]*")*?)\s+[#;].*""")
+_FREE_TEXT = re.compile(r".*Flags|TargetBoardPassword")
+_NUMBER = re.compile(r"[0-9]{1,18}")
 
 
 @dataclass(frozen=True)
@@ -88,9 +94,12 @@ class Section:
         return option.value or None if option else None
 
     def boolean(self, name: str, *, default: bool) -> bool:
-        """Return the option `name`, true or false in any case; `FileError` for another value."""
+        """Return the option `name`, true or false in any case, `default` if it is missing or empty.
+
+        `FileError` for another value.
+        """
         option = self.options.get(name)
-        if option is None:
+        if option is None or not option.value:
             return default
         if option.value.lower() not in {"true", "false"}:
             raise option.error(f"{name} is {option.value!r}.", "Write true or false.")
@@ -99,23 +108,21 @@ class Section:
     def number(self, name: str) -> int:
         """Return the whole number of the option `name`; `FileError` if it is missing or something else."""
         option = self.required(name)
-        if not (option.value.isascii() and option.value.isdigit()):
-            raise option.error(
-                f"{name} is {option.value!r}, not a number.",
-                "Write a whole number, a comment in a line of its own.",
-            )
+        if not _NUMBER.fullmatch(option.value):
+            raise option.error(f"{name} is {option.value!r}, not a number.", "Write a whole number.")
         return int(option.value)
 
 
-def read_sections(path: Path) -> list[Section]:
+def read_sections(path: Path, warnings: list[str]) -> list[Section]:
     """Return the sections of a project file in their order; equal headings stay separate sections.
 
-    `#` or `;` starts a comment line. Nothing is interpolated. `FileError` for a line that is none of heading,
-    option, continuation and comment, and for an option that stands twice in one section.
+    `#` or `;` starts a comment line, and a comment behind a value unless that is free text (flags). Nothing
+    is interpolated. `FileError` for a line that is none of heading, option, continuation and comment, and
+    for an option that stands twice in one section.
     """
     sections: list[Section] = []
     option: Option | None = None
-    for number, line in enumerate(read_text_file(path).split("\n"), start=1):
+    for number, line in enumerate(read_old_text_file(path, warnings).split("\n"), start=1):
         text = line.strip()
         if not text or text[0] in "#;":
             continue
@@ -155,30 +162,40 @@ def unique_names(sections: Iterable[Section]) -> Iterator[tuple[str, Section]]:
 
 
 def _heading(path: Path, number: int, text: str) -> Section:
-    if not text.endswith("]"):
+    heading, bracket, rest = text[1:].rpartition("]")
+    if not bracket or rest.strip()[:1] not in {"", "#", ";"}:
         raise FileError(
             path,
             number,
             f"The heading {text!r} does not end with `]`.",
-            "Write `[Kind@name]` alone in its line, a comment in a line of its own.",
+            "Write `[Kind@name]` alone in its line.",
         )
-    kind, *label = _AT.split(text[1:-1], maxsplit=1)
+    kind, *label = _AT.split(heading, maxsplit=1)
     return Section(path, number, kind.strip(), label[0].strip() if label else "")
 
 
 def _option(path: Path, number: int, text: str) -> Option:
-    name, equals, value = text.partition("=")
-    if not equals or not name.strip():
+    colon = _COLON_OPTION.fullmatch(text)
+    name, equals, value = (colon[1], ":", colon[2]) if colon else text.partition("=")
+    name = name.strip()
+    if not equals or not name:
         raise FileError(
             path,
             number,
             f"{text!r} is neither a heading nor `name = value`.",
             "Start a comment with `#`; indent a line that goes on with the value above it.",
         )
-    return Option(path, number, name.strip(), value.strip(), (number,))
+    return Option(path, number, name, _without_comment(name, value), (number,))
 
 
 def _continued(option: Option, number: int, text: str) -> Option:
+    text = _without_comment(option.name, text)
     if not option.value:
         return replace(option, value=text, value_lines=(number,))
     return replace(option, value=f"{option.value}\n{text}", value_lines=(*option.value_lines, number))
+
+
+def _without_comment(name: str, text: str) -> str:
+    # The blank makes a value that is nothing but a comment end before it.
+    comment = None if _FREE_TEXT.fullmatch(name) else _TRAILING_COMMENT.fullmatch(f" {text}")
+    return (comment[1] if comment else text).strip()

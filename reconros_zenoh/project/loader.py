@@ -71,7 +71,11 @@ class Project:
     def _types(self) -> TypeRegistry:
         registry = TypeRegistry()
         for name, text in self.interfaces.texts.items():
-            (registry.add_service if "/srv/" in name else registry.add_message)(name, text)
+            try:
+                registry.add(name, text)
+            except FileError as error:
+                path = self.interfaces.paths[name]
+                raise FileError(path, error.line, error.problem, error.remedy) from error
         return registry
 
     def mapping(self, name_or_file: str) -> Mapping:

@@ -5,9 +5,10 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
+_MOST_NUMBERS = 1000
 _NAME = re.compile(
     r"(?P<name>[^\s,()@]+)"
-    r"(?:\s*\(\s*(?:(?P<star>\*)|(?P<first>[0-9]+)\s*(?::\s*(?P<last>[0-9]+)\s*)?)\s*\))?"
+    r"(?:\s*\(\s*(?:(?P<star>\*)|(?P<first>[0-9]{1,9})\s*(?::\s*(?P<last>[0-9]{1,9})\s*)?)\s*\))?"
     r"(?:[\s,]+|\Z)"
 )
 
@@ -43,4 +44,6 @@ def _numbered_name(match: re.Match[str]) -> NumberedName:
     last = int(match["last"] or first)
     if last < first:
         raise ValueError(f"The range {match['name']}({first}:{last}) runs backwards.")
+    if last - first >= _MOST_NUMBERS:
+        raise ValueError(f"The range {match['name']}({first}:{last}) is longer than {_MOST_NUMBERS}.")
     return NumberedName(match["name"], range(first, last + 1))

@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from reconros_zenoh.project.ini import Option
 
-# The colon may be missing: Listing 1 of ReconROS Executor, Section IV, lost it in print.
+# The colon may be missing: Listing 1 of ReconROS Executor, Section IV, lost it in print. A pblock may hold a
+# single site.
 _RECTANGLE = re.compile(
-    r"(?P<site>[A-Z][A-Z0-9_]*?)_X(?P<x0>[0-9]+)Y(?P<y0>[0-9]+)\s*:?\s*(?P=site)_X(?P<x1>[0-9]+)Y(?P<y1>[0-9]+)"
-    r"(?:[\s,]+|\Z)"
+    r"(?P<site>[A-Z][A-Z0-9_]*?)_X(?P<x0>[0-9]{1,9})Y(?P<y0>[0-9]{1,9})"
+    r"(?:\s*:?\s*(?P=site)_X(?P<x1>[0-9]{1,9})Y(?P<y1>[0-9]{1,9}))?(?:[\s,]+|\Z)"
 )
 
 
@@ -57,7 +58,8 @@ def read_regions(option: Option) -> tuple[Region, ...]:
                 "Write `SITE_XaYb:SITE_XcYd`, for example `SLICE_X0Y150:SLICE_X103Y199`.",
                 position,
             )
-        region = Region(match["site"], int(match["x0"]), int(match["y0"]), int(match["x1"]), int(match["y1"]))
+        x0, y0 = int(match["x0"]), int(match["y0"])
+        region = Region(match["site"], x0, y0, int(match["x1"] or x0), int(match["y1"] or y0))
         if region.x1 < region.x0 or region.y1 < region.y0:
             raise option.error(
                 f"The corners of {region} are swapped.", "Write the lower left corner first.", position

@@ -94,7 +94,11 @@ def read_resource_groups(sections: Iterable[Section], warnings: list[str]) -> di
                     "Give each group a name of its own.",
                 )
             headings[group] = section
-            declarations = [_declaration(group, number, option) for option in section.options.values()]
+            declarations = [
+                declaration
+                for option in section.options.values()
+                if (declaration := _declaration(group, number, option, warnings))
+            ]
             declared[group] = {declaration.name: declaration for declaration in declarations}
     return {
         group: tuple(_resource(declaration, declared, warnings) for declaration in declarations.values())
@@ -110,10 +114,20 @@ def _groups(section: Section) -> list[tuple[str, str | None]]:
     return [(f"{label.name}_{number}", str(number)) for number in label.numbers]
 
 
-def _declaration(group: str, number: str | None, option: Option) -> _Declaration:
+def _declaration(group: str, number: str | None, option: Option, warnings: list[str]) -> _Declaration | None:
+    """Return the resource that an option declares; None, with a warning, for an unknown type of resource."""
     name, value = option.name, option.value
     if number is not None:
         name, value = name.replace("%", number), value.replace("%", number)
+    written = re.split(r"[\s,]", value, maxsplit=1)[0]
+    resource_type = _MISPRINTS.get(written, written)
+    if resource_type not in _ARGUMENTS:
+        warning = (
+            f"{option.path}:{option.line}: {option.name} is no known resource and left out: {written!r}."
+        )
+        if warning not in warnings:
+            warnings.append(warning)
+        return None
     tokens: list[str] = []
     position = 0
     while position < len(value):
@@ -126,12 +140,7 @@ def _declaration(group: str, number: str | None, option: Option) -> _Declaration
             )
         tokens.append(match["quoted"] or match["plain"])
         position = match.end()
-    written, args = tokens[0] if tokens else "", tuple(tokens[1:])
-    resource_type = _MISPRINTS.get(written, written)
-    if resource_type not in _ARGUMENTS:
-        raise option.error(
-            f"{name} has the unknown resource type {written!r}.", f"Known types: {', '.join(_ARGUMENTS)}."
-        )
+    args = tuple(tokens[1:])
     arguments = _ARGUMENTS[resource_type]
     if resource_type in {"rossub", "rospub"} and args[-1:] == ("hw",):
         arguments = _HARDWARE_MAPPED
@@ -192,7 +201,7 @@ def _interface(declaration: _Declaration) -> str:
 
 
 def _number(declaration: _Declaration, argument: str, text: str) -> int:
-    if not (text.isascii() and text.isdigit()):
+    if not re.fullmatch(r"[0-9]{1,18}", text):
         raise declaration.option.error(
             f"{argument} of {declaration.name} is {text!r}, not a number.", "Write a whole number."
         )

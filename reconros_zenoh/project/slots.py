@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from reconros_zenoh.project.ini import Section
     from reconros_zenoh.project.regions import Region
 
-REGION_OPTION = re.compile(r"Region_?([0-9]+)")
+REGION_OPTION = re.compile(r"Region_?([0-9]{1,9})")
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,11 @@ class HwSlot:
 
 
 def read_slots(
-    sections: Iterable[Section], clocks: Collection[str], *, partial_reconfiguration: bool
+    sections: Iterable[Section],
+    clocks: Collection[str],
+    warnings: list[str],
+    *,
+    partial_reconfiguration: bool,
 ) -> list[HwSlot]:
     """Return the slots of all `[HwSlot@name(a:b)]` sections.
 
@@ -41,7 +45,7 @@ def read_slots(
     """
     slots: list[HwSlot] = []
     for section in sections:
-        for slot in _slots_of(section, clocks, partial_reconfiguration=partial_reconfiguration):
+        for slot in _slots_of(section, clocks, warnings, partial_reconfiguration=partial_reconfiguration):
             twin = next((other for other in slots if slot.id == other.id or slot.name == other.name), None)
             if twin is not None:
                 raise section.error(
@@ -53,7 +57,7 @@ def read_slots(
 
 
 def _slots_of(
-    section: Section, clocks: Collection[str], *, partial_reconfiguration: bool
+    section: Section, clocks: Collection[str], warnings: list[str], *, partial_reconfiguration: bool
 ) -> Iterator[HwSlot]:
     label = section.numbered_label()
     if label.numbers is None:
@@ -61,7 +65,7 @@ def _slots_of(
     first_id = section.number("Id")
     clock = read_clock_name(section, "Clock", clocks)
     reconfigurable = section.boolean("Reconfigurable", default=False)
-    regions = _regions_of(section, label.numbers)
+    regions = _regions_of(section, label.numbers, warnings)
     for offset, number in enumerate(label.numbers):
         name = f"{label.name}({number})"
         if reconfigurable and partial_reconfiguration and not regions.get(number):
@@ -79,7 +83,7 @@ def _slots_of(
         )
 
 
-def _regions_of(section: Section, numbers: range) -> dict[int, tuple[Region, ...]]:
+def _regions_of(section: Section, numbers: range, warnings: list[str]) -> dict[int, tuple[Region, ...]]:
     """Return the regions by the number of the slot; `Region_n` counts as the slots do, or from 0."""
     written = [
         (int(match[1]), option)
@@ -89,16 +93,21 @@ def _regions_of(section: Section, numbers: range) -> dict[int, tuple[Region, ...
     start = numbers.start if any(number == 0 for number, _ in written) else 0
     regions: dict[int, tuple[Region, ...]] = {}
     for number, option in written:
-        if start + number not in numbers or start + number in regions:
+        if start + number in regions:
             raise option.error(
-                f"{option.name} belongs to no slot of {section}, or is the second region of one.",
+                f"{option.name} is the second region of its slot.",
                 "Write one region for each slot of the range.",
             )
+        if start + number not in numbers:
+            warnings.append(
+                f"{option.path}:{option.line}: {option.name} belongs to no slot of {section} and is left out."
+            )
+            continue
         regions[start + number] = read_regions(option)
     return regions
 
 
-def read_slot_ids(section: Section, slots: Collection[HwSlot]) -> tuple[int, ...]:
+def read_slot_ids(section: Section, slots: Collection[HwSlot], warnings: list[str]) -> tuple[int, ...]:
     """Return the ids of the slots that the option `Slot` lists, each once; `slot(*)` is all of that name."""
     option = section.options.get("Slot")
     if option is None:
@@ -112,7 +121,9 @@ def read_slot_ids(section: Section, slots: Collection[HwSlot]) -> tuple[int, ...
         else:
             wanted = [f"{entry.name}({number})" for number in entry.numbers or ()]
         unknown = [name for name in wanted if name not in ids]
-        if unknown or not wanted:
+        if entry.every and not wanted:
+            warnings.append(f"{option.path}:{option.line}: {section}: there is no slot named {entry.name}.")
+        elif unknown or not wanted:
             raise option.error(
                 f"{section} names the unknown slot {', '.join(unknown) or entry.name}.", remedy
             )

@@ -16,9 +16,9 @@ def ros_type_name(package: str, kind: str, name: str) -> str:
 
 
 def inline_message_type(text: str) -> str:
-    """Return the ROS 2 name of a message type written `pkg/Type`; ValueError for other forms."""
+    """Return the ROS 2 name of a message type written `pkg/Type` or `pkg/msg/Type`, else ValueError."""
     match text.split("/"):
-        case [package, name] if package and name:
+        case [package, name] | [package, "msg", name] if package and name:
             return ros_type_name(package, "msg", name)
         case _:
             raise ValueError(f"{text!r} is no message type of the form `pkg/Type`.")

@@ -1,4 +1,4 @@
-"""From the text of a .msg or .srv file to the type definitions that rosbags works with."""
+"""From the text of a .msg, .srv or .action file to the type definitions that rosbags works with."""
 
 from __future__ import annotations
 
@@ -15,8 +15,11 @@ if TYPE_CHECKING:
 
     from rosbags.interfaces.typing import Constdefs, Fielddefs, FieldDesc, Typesdict
 
-_NAME = re.compile(r"(?!.*__)(?!.*_/)([a-z][a-z0-9_]*)/(msg|srv)/([A-Z][A-Za-z0-9]*)")
+_NAME = re.compile(r"(?!.*__)(?!.*_/)([a-z][a-z0-9_]*)/(msg|srv|action)/([A-Z][A-Za-z0-9]*)")
+_WIDE_STRING = re.compile(r"\s*wstring\b")
 _EVENT_INFO = "service_msgs/msg/ServiceEventInfo"
+_GOAL_ID: tuple[str, FieldDesc] = ("goal_id", (Nodetype.NAME, "unique_identifier_msgs/msg/UUID"))
+_STAMP: FieldDesc = (Nodetype.NAME, "builtin_interfaces/msg/Time")
 
 
 def message_definition(name: str, text: str) -> Typesdict:
@@ -35,35 +38,44 @@ def service_definitions(name: str, text: str) -> Typesdict:
     They are its request, response and event, and under `name` itself the structure of the three whose hash
     is the hash of the service. Raises as `message_definition`.
     """
-    package = _package(name, "srv")
-    lines = text.splitlines()
-    separators = [number for number, line in enumerate(lines) if line.strip() == "---"]
-    if len(separators) != 1:
-        raise FileError(
-            name,
-            separators[1] + 1 if separators else None,
-            f"has {len(separators)} lines '---'.",
-            "A service has exactly one, between its request and its response.",
-        )
-    (separator,) = separators
-    request, response, event = (f"{name}_{part}" for part in ("Request", "Response", "Event"))
+    request, response = (f"{name}_{part}" for part in ("Request", "Response"))
+    definitions = _parts(name, "srv", text, (request, response))
+    return {**definitions, **_service(name)}
+
+
+def action_definitions(name: str, text: str) -> Typesdict:
+    """Return the definitions that rosidl makes of action type `name`, whose .action file holds `text`.
+
+    They are its goal, result and feedback, what travels on the wire (the services SendGoal and GetResult, the
+    message FeedbackMessage), and under `name` itself the structure of them all whose hash is the hash of the
+    action. Raises as `message_definition`.
+    """
+    goal, result, feedback = (f"{name}_{part}" for part in ("Goal", "Result", "Feedback"))
+    definitions = _parts(name, "action", text, (goal, result, feedback))
+    send_goal, get_result, message = (
+        f"{name}_{part}" for part in ("SendGoal", "GetResult", "FeedbackMessage")
+    )
     return {
-        request: _definition(package, name, lines[:separator], 1),
-        response: _definition(package, name, lines[separator + 1 :], separator + 2),
-        event: (
+        **definitions,
+        f"{send_goal}_Request": ([], [_GOAL_ID, ("goal", (Nodetype.NAME, goal))]),
+        f"{send_goal}_Response": ([], [("accepted", (Nodetype.BASE, ("bool", 0))), ("stamp", _STAMP)]),
+        **_service(send_goal),
+        f"{get_result}_Request": ([], [_GOAL_ID]),
+        f"{get_result}_Response": (
             [],
-            [
-                ("info", (Nodetype.NAME, _EVENT_INFO)),
-                ("request", (Nodetype.SEQUENCE, ((Nodetype.NAME, request), 1))),
-                ("response", (Nodetype.SEQUENCE, ((Nodetype.NAME, response), 1))),
-            ],
+            [("status", (Nodetype.BASE, ("int8", 0))), ("result", (Nodetype.NAME, result))],
         ),
+        **_service(get_result),
+        message: ([], [_GOAL_ID, ("feedback", (Nodetype.NAME, feedback))]),
         name: (
             [],
             [
-                ("request_message", (Nodetype.NAME, request)),
-                ("response_message", (Nodetype.NAME, response)),
-                ("event_message", (Nodetype.NAME, event)),
+                ("goal", (Nodetype.NAME, goal)),
+                ("result", (Nodetype.NAME, result)),
+                ("feedback", (Nodetype.NAME, feedback)),
+                ("send_goal_service", (Nodetype.NAME, send_goal)),
+                ("get_result_service", (Nodetype.NAME, get_result)),
+                ("feedback_message", (Nodetype.NAME, message)),
             ],
         ),
     }
@@ -93,12 +105,58 @@ def _package(name: str, kind: str) -> str:
     return match[1]
 
 
+def _service(name: str) -> Typesdict:
+    """Return the event of a service and the structure whose hash is the hash of the service."""
+    request, response, event = (f"{name}_{part}" for part in ("Request", "Response", "Event"))
+    return {
+        event: (
+            [],
+            [
+                ("info", (Nodetype.NAME, _EVENT_INFO)),
+                ("request", (Nodetype.SEQUENCE, ((Nodetype.NAME, request), 1))),
+                ("response", (Nodetype.SEQUENCE, ((Nodetype.NAME, response), 1))),
+            ],
+        ),
+        name: (
+            [],
+            [
+                ("request_message", (Nodetype.NAME, request)),
+                ("response_message", (Nodetype.NAME, response)),
+                ("event_message", (Nodetype.NAME, event)),
+            ],
+        ),
+    }
+
+
+def _parts(name: str, kind: str, text: str, parts: Sequence[str]) -> Typesdict:
+    """Return the definitions of the parts of a text, which lines `---` divide."""
+    package = _package(name, kind)
+    lines = text.splitlines()
+    separators = [number for number, line in enumerate(lines) if line.strip() == "---"]
+    wanted = len(parts) - 1
+    if len(separators) != wanted:
+        raise FileError(
+            name,
+            separators[wanted] + 1 if len(separators) > wanted else None,
+            f"has {len(separators)} lines '---'.",
+            f"A .{kind} file has exactly {wanted}, to divide its {len(parts)} parts.",
+        )
+    starts = [0, *(separator + 1 for separator in separators)]
+    ends = [*separators, len(lines)]
+    return {
+        part: _definition(package, name, lines[start:end], start + 1)
+        for part, start, end in zip(parts, starts, ends, strict=True)
+    }
+
+
 def _definition(
     package: str, name: str, lines: Sequence[str], first_number: int
 ) -> tuple[Constdefs, Fielddefs]:
     constants: Constdefs = []
     fields: Fielddefs = []
     for number, line in enumerate(lines, first_number):
+        if _WIDE_STRING.match(line):
+            raise FileError(name, number, "wstring is not supported.", "Use string, which holds UTF-8.")
         try:
             # rosbags takes the names of messages only; the name says where `Type` without package is.
             ((more_constants, more_fields),) = get_types_from_msg(line, f"{package}/msg/Line").values()

@@ -1,4 +1,4 @@
-"""Message and service types: their names, hashes and CDR serialisation, on top of rosbags."""
+"""Message, service and action types: their names, hashes and CDR serialisation, on top of rosbags."""
 
 from __future__ import annotations
 
@@ -14,8 +14,14 @@ from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, TypesysError, get_typestore
 
 from reconros_zenoh.errors import BadMessageError, FileError, UsageError
-from reconros_zenoh.ros.definitions import char_as_uint8, message_definition, service_definitions
+from reconros_zenoh.ros.definitions import (
+    action_definitions,
+    char_as_uint8,
+    message_definition,
+    service_definitions,
+)
 from reconros_zenoh.ros.names import dds_type_name
+from reconros_zenoh.ros.standard import standard_interfaces
 
 if TYPE_CHECKING:
     from collections.abc import Collection
@@ -41,12 +47,6 @@ _LITTLE_ENDIAN = 0x0001
 
 _SPLIT_FROM = 65536
 """Arrays from this size [byte] on are not copied; below, a copy takes less time than a second part."""
-
-_STD_SRVS = {
-    "std_srvs/srv/Empty": "---",
-    "std_srvs/srv/SetBool": "bool data\n---\nbool success\nstring message",
-    "std_srvs/srv/Trigger": "---\nbool success\nstring message",
-}
 
 
 class MessageType:
@@ -147,8 +147,28 @@ class ServiceType:
     response: MessageType
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class ActionType:
+    """An action type, `package/action/Type`, and what travels between its clients and its server.
+
+    `<action>/_action/send_goal`, `get_result` and `cancel_goal` are services of these types;
+    `feedback_message` and `status` are the messages on the topics `<action>/_action/feedback` and `status`.
+    """
+
+    name: str
+    type_hash: str
+    goal: MessageType
+    result: MessageType
+    feedback: MessageType
+    send_goal: ServiceType
+    get_result: ServiceType
+    cancel_goal: ServiceType
+    feedback_message: MessageType
+    status: MessageType
+
+
 class TypeRegistry:
-    """The message types of ROS 2 Jazzy, the services of std_srvs, and the types that are added.
+    """The types of the standard packages of ROS 2 Jazzy, and the types that are added.
 
     The first type that is asked for takes as long as rosbags needs to load those of Jazzy. To be used from
     one thread; the types it returns may be used from all.
@@ -157,15 +177,19 @@ class TypeRegistry:
     def __init__(self) -> None:
         self._messages: dict[str, MessageType] = {}
         self._services: dict[str, ServiceType] = {}
+        self._actions: dict[str, ActionType] = {}
         self._service_names: set[str] = set()
+        self._action_names: set[str] = set()
 
     def message(self, name: str) -> MessageType:
         """Return the message type `name`: `std_msgs/msg/UInt32`, `std_msgs/UInt32` or `std_msgs/U_Int32`.
 
         The last is how ReconROS spells it. Raises UsageError when the type, or a type in it, is not known.
         """
-        full_name = _find(name, "msg", self._store.fielddefs.keys() - self._service_names)
+        known = self._store.fielddefs.keys() - self._service_names - self._action_names
+        full_name = _find(name, "msg", known | _standard("msg"))
         if full_name not in self._messages:
+            self._add_standard(full_name)
             self._check_fields(full_name, ())
             self._messages[full_name] = MessageType(self._store, full_name)
         return self._messages[full_name]
@@ -175,10 +199,9 @@ class TypeRegistry:
 
         Raises UsageError when the type, or a type in it, is not known.
         """
-        full_name = _find(name, "srv", self._service_names | _STD_SRVS.keys())
-        if full_name not in self._service_names:
-            self.add_service(full_name, _STD_SRVS[full_name])
+        full_name = _find(name, "srv", self._service_names | _standard("srv"))
         if full_name not in self._services:
+            self._add_standard(full_name)
             request = self.message(f"{full_name}_Request")
             response = self.message(f"{full_name}_Response")
             self._services[full_name] = ServiceType(
@@ -186,21 +209,64 @@ class TypeRegistry:
             )
         return self._services[full_name]
 
-    def add_message(self, name: str, text: str) -> None:
-        """Make the message type `name` (`package/msg/Type`) known, whose .msg file holds `text`.
+    def action(self, name: str) -> ActionType:
+        """Return the action type `name`: `tf2_msgs/action/LookupTransform` or `tf2_msgs/Lookup_Transform`.
+
+        Raises UsageError when the type, or a type in it, is not known.
+        """
+        full_name = _find(name, "action", self._action_names | _standard("action"))
+        if full_name not in self._actions:
+            self._add_standard(full_name)
+            self._actions[full_name] = ActionType(
+                full_name,
+                self._store.hash_rihs01(full_name),
+                goal=self.message(f"{full_name}_Goal"),
+                result=self.message(f"{full_name}_Result"),
+                feedback=self.message(f"{full_name}_Feedback"),
+                send_goal=self.service(f"{full_name}_SendGoal"),
+                get_result=self.service(f"{full_name}_GetResult"),
+                cancel_goal=self.service("action_msgs/srv/CancelGoal"),
+                feedback_message=self.message(f"{full_name}_FeedbackMessage"),
+                status=self.message("action_msgs/msg/GoalStatusArray"),
+            )
+        return self._actions[full_name]
+
+    def add(self, name: str, text: str) -> None:
+        """Make the type `name` (`package/kind/Type`) known, whose file of that kind holds `text`.
 
         Raises FileError (with the type in place of the path) when the text cannot be understood, UsageError
         when the name cannot be used. Types in it may be added later.
+        """
+        if "/srv/" in name:
+            self.add_service(name, text)
+        elif "/action/" in name:
+            self.add_action(name, text)
+        else:
+            self.add_message(name, text)
+
+    def add_message(self, name: str, text: str) -> None:
+        """Make the message type `name` (`package/msg/Type`) known, whose .msg file holds `text`.
+
+        Raises as `add`.
         """
         self._register(name, message_definition(name, text))
 
     def add_service(self, name: str, text: str) -> None:
         """Make the service type `name` (`package/srv/Type`) known, whose .srv file holds `text`.
 
-        Raises as `add_message`.
+        Raises as `add`.
         """
         self._register(name, service_definitions(name, text))
         self._service_names.add(name)
+
+    def add_action(self, name: str, text: str) -> None:
+        """Make the action type `name` (`package/action/Type`) known, whose .action file holds `text`.
+
+        Raises as `add`.
+        """
+        self._register(name, action_definitions(name, text))
+        self._action_names.add(name)
+        self._service_names |= {f"{name}_SendGoal", f"{name}_GetResult"}
 
     @cached_property
     def _store(self) -> Typestore:
@@ -208,6 +274,11 @@ class TypeRegistry:
         for name, (constants, fields) in store.fielddefs.items():
             store.fielddefs[name] = (constants, [(field, char_as_uint8(form)) for field, form in fields])
         return store
+
+    def _add_standard(self, name: str) -> None:
+        """Make the type known if it is a standard one that rosbags does not bring and nobody has added."""
+        if name in standard_interfaces() and name not in self._store.fielddefs:
+            self.add(name, standard_interfaces()[name].read_text(encoding="utf-8"))
 
     def _register(self, name: str, definitions: Typesdict) -> None:
         try:
@@ -222,6 +293,7 @@ class TypeRegistry:
                 continue
             if inner[1] in (*owners, name):
                 raise UsageError(f"Field {field!r} of {name} contains {name} itself. Take it out.")
+            self._add_standard(inner[1])
             if inner[1] not in self._store.fielddefs:
                 raise UsageError(
                     f"Field {field!r} of {name} has the type {inner[1]}, which is not known. "
@@ -253,6 +325,10 @@ def _can_be_viewed(array: Any, dtype: np.dtype[Any]) -> bool:
         and array.ndim == 1
         and array.flags.c_contiguous
     )
+
+
+def _standard(kind: str) -> set[str]:
+    return {name for name in standard_interfaces() if f"/{kind}/" in name}
 
 
 def _find(name: str, kind: str, known: Collection[str]) -> str:

@@ -1,8 +1,9 @@
-"""How the C library keeps the memory of large messages."""
+"""How a process of this project keeps its memory."""
 
 from __future__ import annotations
 
 import ctypes
+import gc
 
 # <malloc.h> of glibc
 _M_TRIM_THRESHOLD = -1
@@ -10,9 +11,21 @@ _M_TOP_PAD = -2
 _M_MMAP_THRESHOLD = -3
 
 _MIB = 1024 * 1024
+_OBJECTS_BETWEEN_COLLECTIONS = 50_000
 
 
-def tune_malloc() -> None:
+def tune_memory() -> None:
+    """Leave what was imported out of the search for garbage, and keep large buffers in this process.
+
+    To be called once, when everything is imported and before any thread starts. CPython's collector would go
+    through all modules time and again.
+    """
+    gc.freeze()
+    gc.set_threshold(_OBJECTS_BETWEEN_COLLECTIONS)
+    _tune_malloc()
+
+
+def _tune_malloc() -> None:
     """Freed buffers of up to 32 MiB stay in this process, so that the next large message finds them mapped.
 
     glibc otherwise returns every buffer of a large message to the kernel, and each new one costs a page

@@ -29,7 +29,7 @@ from host_clients.image import image_message
 from reconros_zenoh.clock.wall import keep_time
 from reconros_zenoh.rmw.node import Context
 from reconros_zenoh.ros.types import TypeRegistry
-from reconros_zenoh.transport.memory import tune_malloc
+from reconros_zenoh.transport.memory import tune_memory
 from reconros_zenoh.transport.zenoh import ZenohRouter, ZenohTransport
 
 if TYPE_CHECKING:
@@ -52,7 +52,7 @@ def raw_session(router: str) -> zenoh.Session:
 
 def raw_echo(router: str) -> None:
     """Send every message back until stdin closes: the rival's echo process."""
-    tune_malloc()
+    tune_memory()
     with raw_session(router) as session:
         publisher = session.declare_publisher("raw/out", congestion_control=zenoh.CongestionControl.DROP)
 
@@ -67,7 +67,7 @@ def raw_echo(router: str) -> None:
 def raw_client(router: str) -> None:
     """For each line `bytes count` on stdin print the median round trip [us]: the rival's client process."""
     keep_time()
-    tune_malloc()
+    tune_memory()
     answers: SimpleQueue[int] = SimpleQueue()
 
     def on_sample(sample: zenoh.Sample) -> None:
@@ -126,7 +126,7 @@ def main() -> None:
 def run() -> list[dict[str, Any]]:
     """Start the processes of both sides and return a row per message."""
     keep_time()
-    tune_malloc()
+    tune_memory()
     router = f"tcp/127.0.0.1:{free_port()}"
     board = ["-m", "board_daemon", str(ECHO), "--profile=native", "--mapping=software", "--name=echo"]
     # What our transport sets for its own process must not reach the rival's.

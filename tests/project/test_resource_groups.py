@@ -37,13 +37,14 @@ def read(tmp_path: Path, text: str) -> BuildConfiguration:
 def test_type_names(written: str, normalised: str) -> None:
     assert ros_type_name("std_msgs", "msg", written) == normalised
     assert inline_message_type(f"std_msgs/{written}") == normalised
+    assert inline_message_type(f"std_msgs/msg/{written}") == normalised
 
 
 def test_a_type_of_another_package_keeps_its_letters() -> None:
     assert ros_type_name("my_msgs", "srv", "UintPair") == "my_msgs/srv/UintPair"
 
 
-@pytest.mark.parametrize("text", ["UInt32", "std_msgs/msg/UInt32", "/UInt32", "std_msgs/"])
+@pytest.mark.parametrize("text", ["UInt32", "std_msgs/srv/UInt32", "/UInt32", "std_msgs/"])
 def test_no_inline_type(text: str) -> None:
     with pytest.raises(ValueError, match="pkg/Type"):
         inline_message_type(text)
@@ -76,8 +77,6 @@ def test_percent_outside_a_range_stays(tmp_path: Path) -> None:
 
 
 MISTAKES = {
-    "unknown type": ("x = rosfoo, node", "unknown resource type 'rosfoo'"),
-    "no type": ("x =", "unknown resource type ''"),
     "too few arguments": ("x = rossub, node, msg", "do not fit rossub"),
     "too many arguments": ('x = rospub, node, msg, "/t", 5', "do not fit rospub"),
     "kind of another type": ("x = rosmsg, std_srvs, srv, Empty", "do not fit rosmsg"),
@@ -104,6 +103,14 @@ def test_a_mistake_is_reported_with_its_line(tmp_path: Path, resource: str, prob
     assert caught.value.line == 6
     assert problem in str(caught.value)
     assert caught.value.remedy
+
+
+@pytest.mark.parametrize("resource", ["x = rosfoo, (a) b", "x ="])
+def test_an_unknown_type_is_left_out_with_a_warning(tmp_path: Path, resource: str) -> None:
+    configuration = read(tmp_path, f"{GROUP}{resource}\n")
+    assert "x" not in [found.name for found in configuration.resources]
+    [warning] = configuration.warnings
+    assert warning.startswith(f"{tmp_path}/build.cfg:6: x is no known resource")
 
 
 def test_a_reference_to_one_of_several_groups(tmp_path: Path) -> None:

@@ -210,7 +210,7 @@ def test_lines_of_a_service_are_counted_through(registry: TypeRegistry) -> None:
 
 @pytest.mark.parametrize(("text", "line"), [("uint32 a\n", None), ("---\n---\n", 2)])
 def test_a_service_has_one_separator(registry: TypeRegistry, text: str, line: int | None) -> None:
-    with pytest.raises(FileError, match="exactly one") as caught:
+    with pytest.raises(FileError, match="exactly 1") as caught:
         registry.add_service("lab_msgs/srv/Wrong", text)
     assert caught.value.line == line
 

@@ -5,7 +5,7 @@ import subprocess
 import sys
 from typing import TYPE_CHECKING
 
-from reconros_zenoh.transport.memory import tune_malloc
+from reconros_zenoh.transport.memory import tune_memory
 
 if TYPE_CHECKING:
     import pytest
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 # Counts the buffers that malloc has taken from the kernel one by one (`hblks` of mallinfo2).
 COUNT_MAPPED = """
 import ctypes
-from reconros_zenoh.transport.memory import tune_malloc
+from reconros_zenoh.transport.memory import tune_memory
 
 class MallInfo(ctypes.Structure):
     _fields_ = [(name, ctypes.c_size_t) for name in
@@ -24,7 +24,7 @@ mallinfo.restype = MallInfo
 before = mallinfo().hblks
 untuned = bytearray(6 << 20)
 between = mallinfo().hblks
-tune_malloc()
+tune_memory()
 tuned = bytearray(6 << 20)
 print(between - before, mallinfo().hblks - between)
 """
@@ -39,4 +39,4 @@ def test_large_buffers_come_from_the_heap() -> None:
 
 def test_a_c_library_without_mallopt_is_left_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(ctypes, "CDLL", lambda _: object())
-    tune_malloc()
+    tune_memory()

@@ -1,0 +1,226 @@
+"""`reconros check`: what a ReconROS project file says."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from rich.box import SIMPLE_HEAD
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from reconros_zenoh.project.build_cfg import read_build_cfg
+from reconros_zenoh.project.interfaces import read_interfaces
+from reconros_zenoh.project.resources import slot_resources
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from reconros_zenoh.project.build_cfg import BuildConfiguration
+    from reconros_zenoh.project.slots import HwSlot
+
+_ENDPOINTS = {
+    "topics": ("rossub", "rospub"),
+    "services": ("rossrvs", "rossrvc"),
+    "actions": ("rosactions", "rosactionc"),
+}
+_ROLES = {
+    "rossub": "subscribes",
+    "rospub": "publishes",
+    "rossrvs": "serves",
+    "rossrvc": "calls",
+    "rosactions": "serves",
+    "rosactionc": "calls",
+}
+
+
+def check(
+    project: Annotated[Path, typer.Argument(metavar="build.cfg|PROJECT", help="A project file or folder.")],
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
+) -> None:
+    """Read a ReconROS project file and show what it says; exit status 2 when it cannot be used.
+
+    What a folder holds in msg/ is read too.
+    """
+    path = project / "build.cfg" if project.is_dir() else project
+    configuration = read_build_cfg(path)
+    if project.is_dir():
+        read_interfaces(project)
+    if as_json:
+        print(json.dumps(_as_json(configuration)))
+        return
+    # What is read by another program must not have its names broken into lines.
+    width = None if sys.stdout.isatty() else 200
+    console = Console(width=width, highlight=False, markup=False, emoji=False, soft_wrap=True)
+    _print(console, configuration)
+    for warning in configuration.warnings:
+        console.print(f"warning: {warning}", style="yellow")
+
+
+def _as_json(configuration: BuildConfiguration) -> dict[str, Any]:
+    return {
+        "name": configuration.name,
+        "board": _board(configuration),
+        "part": configuration.part,
+        "os": configuration.os,
+        "partial_reconfiguration": configuration.partial_reconfiguration,
+        "ros2_distribution": configuration.ros2_distribution,
+        "clocks": [
+            {"name": clock.name, "source": clock.source, "hz": clock.hz} for clock in configuration.clocks
+        ],
+        "slots": [_slot(slot) for slot in configuration.slots],
+        "threads": [
+            {
+                "name": thread.name,
+                "slots": thread.slots,
+                "hardware": thread.hardware,
+                "software": thread.software,
+                "resource_groups": thread.resource_groups,
+            }
+            for thread in configuration.threads
+        ],
+        "resources": [
+            {"group": resource.group, "name": resource.name, "type": resource.type, "args": resource.args}
+            for resource in configuration.resources
+        ],
+        "gateways": [
+            {
+                "name": gateway.name,
+                "slots": gateway.slots,
+                "hw_topic": gateway.hw_topic,
+                "sw_topic": gateway.sw_topic,
+                "type": gateway.type,
+            }
+            for gateway in configuration.gateways
+        ],
+        "warnings": configuration.warnings,
+    }
+
+
+def _board(configuration: BuildConfiguration) -> str | None:
+    """Return the board as TargetBoard writes it: `zedboard,d`."""
+    board = configuration.board
+    return None if board is None else f"{board.board},{board.revision}".rstrip(",")
+
+
+def _slot(slot: HwSlot) -> dict[str, Any]:
+    resources = slot_resources(slot.regions)
+    return {
+        "id": slot.id,
+        "name": slot.name,
+        "clock": slot.clock,
+        "reconfigurable": slot.reconfigurable,
+        "lut": resources.lut,
+        "dsp": resources.dsp,
+        "bram36": resources.bram36,
+        "bram18": resources.bram18,
+    }
+
+
+def _print(console: Console, configuration: BuildConfiguration) -> None:
+    facts = {
+        "board": _board(configuration),
+        "part": configuration.part,
+        "os": configuration.os,
+        "ROS 2": configuration.ros2_distribution,
+        "partial reconfiguration": "yes" if configuration.partial_reconfiguration else "no",
+    }
+    console.print(configuration.name, style="bold")
+    console.print(", ".join(f"{name} {fact}" for name, fact in facts.items() if fact))
+    names = {slot.id: slot.name for slot in configuration.slots}
+    _table(
+        console,
+        "clocks",
+        ("name", "source", "Hz"),
+        ((clock.name, clock.source, clock.hz) for clock in configuration.clocks),
+    )
+    slots = map(_slot, configuration.slots)
+    _table(
+        console,
+        "slots",
+        ("id", "name", "clock", "reconfigurable", "LUT", "DSP", "BRAM36", "BRAM18"),
+        (
+            ["yes" if value is True else "no" if value is False else value for value in slot.values()]
+            for slot in slots
+        ),
+    )
+    _table(
+        console,
+        "threads",
+        ("name", "slots", "hardware", "software", "resource groups"),
+        (
+            (
+                thread.name,
+                " ".join(names[slot] for slot in thread.slots),
+                thread.hardware,
+                thread.software,
+                " ".join(thread.resource_groups),
+            )
+            for thread in configuration.threads
+        ),
+    )
+    _print_resources(console, configuration)
+    _table(
+        console,
+        "gateways",
+        ("name", "slots", "hardware-mapped", "software-mapped", "type"),
+        (
+            (
+                gateway.name,
+                " ".join(names[slot] for slot in gateway.slots),
+                gateway.hw_topic,
+                gateway.sw_topic,
+                gateway.type,
+            )
+            for gateway in configuration.gateways
+        ),
+    )
+
+
+def _print_resources(console: Console, configuration: BuildConfiguration) -> None:
+    resources = configuration.resources
+    nodes = (resource for resource in resources if resource.type == "rosnode")
+    _table(console, "nodes", ("node", "group"), ((node.ros_name, node.group) for node in nodes))
+    for title, types in _ENDPOINTS.items():
+        _table(
+            console,
+            title,
+            (title.removesuffix("s"), "", "node", "type", "group"),
+            (
+                (
+                    resource.ros_name,
+                    _ROLES[resource.type] + (" (hardware-mapped)" if resource.hardware_mapped else ""),
+                    resource.node,
+                    resource.interface,
+                    resource.group,
+                )
+                for resource in resources
+                if resource.type in types
+            ),
+        )
+    timers = (resource for resource in resources if resource.type == "rostmr")
+    _table(
+        console,
+        "timers",
+        ("timer", "period [ms]", "node", "group"),
+        ((timer.name, timer.number, timer.node, timer.group) for timer in timers),
+    )
+
+
+def _table(console: Console, title: str, columns: Iterable[str], rows: Iterable[Iterable[object]]) -> None:
+    """Print a table unless it has no rows; numbers stand to the right."""
+    content = [list(row) for row in rows]
+    if not content:
+        return
+    table = Table(title=Text(title, style="bold"), title_justify="left", box=SIMPLE_HEAD, show_edge=False)
+    for index, column in enumerate(columns):
+        numbers = all(isinstance(row[index], int) for row in content)
+        table.add_column(Text(column), justify="right" if numbers else "left", overflow="fold")
+    for row in content:
+        table.add_row(*(Text("-" if value in {None, ""} else str(value)) for value in row))
+    console.print()
+    console.print(table)
