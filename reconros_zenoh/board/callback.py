@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from reconros_zenoh.board.actions import ActionClientSource
     from reconros_zenoh.board.bitstream import Bitstream
     from reconros_zenoh.board.board import Board
     from reconros_zenoh.board.endpoints import Event
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
     from reconros_zenoh.board.software import Outlet
     from reconros_zenoh.board.timing import ExecutionTime
     from reconros_zenoh.clock.activity import Awaitable
+    from reconros_zenoh.rmw.action_server import GoalHandle
     from reconros_zenoh.ros.types import MessageType
 
 R = TypeVar("R")
@@ -220,6 +222,28 @@ class HardwareThread(DelegateCalls):
     def call(self, client: Outlet, request: object) -> Generator[Awaitable, object, None]:
         """Call a service through the delegate; its response starts a CLT callback."""
         return self.publish(client, request)
+
+    def send_goal(self, client: ActionClientSource, goal: object) -> Generator[Awaitable, object, bytes]:
+        """Send the goal through the delegate and return its id; what becomes of it starts a CLT callback."""
+        yield from self._call()
+        goal_id = client.new_goal_id()
+        client.send_goal(goal, goal_id)
+        return goal_id
+
+    def cancel_goal(self, client: ActionClientSource, goal_id: bytes) -> Generator[Awaitable, object, None]:
+        """Ask through the delegate for a goal to end early."""
+        yield from self._call()
+        client.cancel_goal(goal_id)
+
+    def feedback(self, handle: GoalHandle, feedback: object) -> Generator[Awaitable, object, None]:
+        """Publish feedback on the goal that the callback serves through the delegate."""
+        yield from self._call()
+        handle.feedback(feedback)
+
+    def is_cancel_requested(self, handle: GoalHandle) -> Generator[Awaitable, object, bool]:
+        """Ask the delegate whether the goal that the callback serves shall end early."""
+        yield from self._call()
+        return handle.is_cancel_requested
 
     def exit(self, response: object = None) -> Generator[Awaitable, object, None]:
         """End the callback, whose answer is `response`: THREAD_EXIT. What stands behind it does not run."""

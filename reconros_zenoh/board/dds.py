@@ -71,14 +71,17 @@ class DdsStack:
             self._loss_probability = dds.loss_probability.share
             self._heartbeat_ns = dds.heartbeat_period.ns
 
-    def receive(self, size: int, transit_ns: int, timeline: Timeline) -> Generator[Awaitable, object, None]:
+    def receive(
+        self, size: int, transit_ns: int, timeline: Timeline, *, reliable: bool = True
+    ) -> Generator[Awaitable, object, bool]:
         """Return when a message of `size` bytes has come through the stack.
 
-        It left when its timeline started and was in the real network for `transit_ns`.
+        It left when its timeline started and was in the real network for `transit_ns`. False: a fragment of
+        it was lost, and without reliability nobody sends it again.
         """
         if not self._modelled:
             timeline.mark("transport")
-            return
+            return True
         large = size > self._large_from
         known_ns = min(max(0, transit_ns), self._link_ns(size))
         self._transit_ns[large] += (known_ns - self._transit_ns[large]) / _TRANSITS_REMEMBERED
@@ -87,19 +90,25 @@ class DdsStack:
         timeline.mark("transport")
         yield from self._process(size)
         timeline.mark("dds")
-        yield from self._repair(size, timeline)
+        return (yield from self._repair(size, timeline, reliable=reliable))
 
-    def send(self, size: int, timeline: Timeline) -> Generator[Awaitable, object, None]:
-        """Return when a message of `size` bytes has gone through the stack and over the link."""
+    def send(
+        self, size: int, timeline: Timeline, *, reliable: bool = True
+    ) -> Generator[Awaitable, object, bool]:
+        """Return when a message of `size` bytes has gone through the stack and over the link.
+
+        False: it was lost on the way, as in `receive`.
+        """
         if not self._modelled:
             timeline.mark("dds")
-            return
+            return True
         yield from self._process(size)
         timeline.mark("dds")
-        yield from self._repair(size, timeline)
+        complete = yield from self._repair(size, timeline, reliable=reliable)
         arrives_ns = self._environment.now + self._link_ns(size)
         yield from self._until(arrives_ns - round(self._transit_ns[size > self._large_from]))
         timeline.mark("transport")
+        return complete
 
     def _link_ns(self, size: int) -> int:
         return self._latency_ns + round(size * self._link_ns_per_byte)
@@ -123,10 +132,13 @@ class DdsStack:
         yield from self._cpu.run_stack(passage.duration_ns * self._core_share, self._core_share)
         passage.done.fire()
 
-    def _repair(self, size: int, timeline: Timeline) -> Generator[Awaitable, object, None]:
-        """Return when no fragment of a large message is missing any more."""
+    def _repair(self, size: int, timeline: Timeline, *, reliable: bool) -> Generator[Awaitable, object, bool]:
+        """Return when no fragment of a large message is missing any more; False when one is for ever."""
         if size <= self._large_from:
-            return
+            return True
+        if not reliable:
+            lost = self._randomness.random() < self._loss_probability
+            return not lost and self._randomness.random() >= self._nack_probability
         if self._randomness.random() < self._loss_probability:
             yield self._environment.timeout(round(self._randomness.uniform(0, self._heartbeat_ns)))
             timeline.mark("retransmission")
@@ -134,3 +146,4 @@ class DdsStack:
             yield self._environment.timeout(self._nack_delay_ns)
             yield from self._process(size)
             timeline.mark("retransmission")
+        return True

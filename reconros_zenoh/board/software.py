@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import logging
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any, Protocol, TypeAlias, TypeVar
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from reconros_zenoh.board.actions import ActionClientSource
     from reconros_zenoh.board.board import Board
     from reconros_zenoh.board.os_resources import Condition, Mailbox, Mutex, Semaphore
     from reconros_zenoh.board.spans import Timeline
@@ -39,14 +41,6 @@ class Outlet(Protocol):
         """Send an encoded message."""
 
 
-@dataclass(frozen=True, slots=True)
-class Publication:
-    """A message that a callback sends, encoded."""
-
-    outlet: Outlet
-    parts: Parts
-
-
 class SoftwareContext:
     """What a software callback can do besides computing; it belongs to one call of it, in one thread.
 
@@ -58,7 +52,7 @@ class SoftwareContext:
         # What is measured is really computed each time.
         self._really = time.ns is None and time.modelled
         self._mutexes: dict[Mutex, None] = {}
-        self.publications: list[Publication] = []
+        self.sends: list[Callable[[Timeline], object]] = []
         self.log = logging.getLogger(f"{__name__}.{callback}")
 
     @property
@@ -74,11 +68,24 @@ class SoftwareContext:
 
     def publish(self, writer: Outlet, message: object) -> None:
         """Publish the message once the callback has run to completion."""
-        self.publications.append(Publication(writer, writer.encode(message)))
+        self.sends.append(partial(writer.send, writer.encode(message)))
 
     def call(self, client: Outlet, request: object) -> None:
         """Call the service once the callback has run to completion; its response starts a CLT callback."""
         self.publish(client, request)
+
+    def send_goal(self, client: ActionClientSource, goal: object) -> bytes:
+        """Send the goal once the callback has run to completion, and return its id.
+
+        What becomes of it starts the callback of the client.
+        """
+        goal_id = client.new_goal_id()
+        self.sends.append(lambda _: client.send_goal(goal, goal_id))
+        return goal_id
+
+    def cancel_goal(self, client: ActionClientSource, goal_id: bytes) -> None:
+        """Ask for a goal to end early, once the callback has run to completion."""
+        self.sends.append(lambda _: client.cancel_goal(goal_id))
 
     def mbox_tryget(self, mailbox: Mailbox) -> int | None:
         """Remove the oldest word and return it, or None."""

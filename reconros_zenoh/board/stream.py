@@ -18,10 +18,13 @@ T = TypeVar("T")
 class Stream(Generic[T]):
     """Hands items to a process in order: the next when it is done with the one before.
 
-    At most `depth` wait; a further one pushes the oldest out (KEEP_LAST) and is counted in `dropped`.
+    At most `depth` wait (None: any number); a further one pushes the oldest out (KEEP_LAST) and is counted in
+    `dropped`.
     """
 
-    def __init__(self, process: Callable[[T], Generator[Awaitable, object, object]], depth: int) -> None:
+    def __init__(
+        self, process: Callable[[T], Generator[Awaitable, object, object]], depth: int | None
+    ) -> None:
         self._process = process
         self._waiting: deque[T] = deque(maxlen=depth)
         self._activity = Activity(self._run())

@@ -88,8 +88,8 @@ class SoftwareWorker(Worker):
             response = yield from self._run_function(implementation, event, context)
         finally:
             context.release_mutexes()
-        for publication in context.publications:
-            publication.outlet.send(publication.parts, timeline.fork())
+        for send in context.sends:
+            send(timeline.fork())
         return response
 
     def _run_function(

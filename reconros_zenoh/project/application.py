@@ -6,9 +6,13 @@ from typing import TYPE_CHECKING, TypeVar, cast
 
 import numpy as np
 
+from reconros_zenoh.board.actions import ActionClientSource, ActionSource
+from reconros_zenoh.board.clients import ClientSource
 from reconros_zenoh.board.endpoints import ServiceSource, SubscriptionSource, TimerSource, TopicWriter
 from reconros_zenoh.board.os_resources import Condition, Mailbox, Mutex, Semaphore, SharedMemory
+from reconros_zenoh.board.stack_node import StackNode
 from reconros_zenoh.errors import UsageError
+from reconros_zenoh.rmw.parameters import Parameters
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -21,6 +25,7 @@ if TYPE_CHECKING:
     from reconros_zenoh.project.mapping_file import Mapping
     from reconros_zenoh.project.resource_groups import Resource
     from reconros_zenoh.rmw.node import Node
+    from reconros_zenoh.ros.qos import QosProfile
     from reconros_zenoh.ros.types import TypeRegistry
 
 
@@ -46,11 +51,17 @@ class Application:
             (resource.group, resource.name): resource for resource in project.configuration.resources
         }
         self._nodes: dict[str, Node] = {}
-        self._os_resources: dict[tuple[str, str], object] = {}
+        self._made: dict[tuple[str, str], object] = {}
 
-    def source(self, group: str, name: str) -> Source:
-        """Return the end of a topic, service or timer that makes a callback ready."""
+    def source(self, group: str, name: str, qos: QosProfile | None = None) -> Source:
+        """Return the end of a topic, service, action or timer that makes a callback ready.
+
+        `qos` is for a topic: without it reliable, volatile, the last 10. For a client it is what `client` or
+        `action_client` returns.
+        """
         resource = self._resource(group, name)
+        if qos is not None and resource.type != "rossub":
+            raise UsageError(f"resource {name!r} of group {group!r} is a {resource.type}: its QoS is fixed.")
         match resource.type:
             case "rossub":
                 return SubscriptionSource(
@@ -58,6 +69,7 @@ class Application:
                     self._node(resource),
                     self.types.message(_required(resource.interface)),
                     _required(resource.ros_name),
+                    qos,
                 )
             case "rossrvs":
                 return ServiceSource(
@@ -66,20 +78,60 @@ class Application:
                     self.types.service(_required(resource.interface)),
                     _required(resource.ros_name),
                 )
+            case "rossrvc":
+                return self.client(group, name)
+            case "rosactions":
+                return ActionSource(
+                    self.board,
+                    self._node(resource),
+                    self.types.action(_required(resource.interface)),
+                    _required(resource.ros_name),
+                )
+            case "rosactionc":
+                return self.action_client(group, name)
             case "rostmr":
                 return TimerSource(self.board, _required(resource.number) * 1_000_000)
         raise UsageError(
             f"resource {name!r} of group {group!r} is a {resource.type}: it makes no callback ready."
         )
 
-    def writer(self, group: str, name: str) -> TopicWriter:
-        """Return the publisher of that name."""
+    def client(self, group: str, name: str) -> ClientSource:
+        """Return the service client of that name, the same one each time."""
+        return self._shared(
+            group,
+            name,
+            "rossrvc",
+            lambda resource: ClientSource(
+                self.board,
+                self._node(resource),
+                self.types.service(_required(resource.interface)),
+                _required(resource.ros_name),
+            ),
+        )
+
+    def action_client(self, group: str, name: str) -> ActionClientSource:
+        """Return the action client of that name, the same one each time."""
+        return self._shared(
+            group,
+            name,
+            "rosactionc",
+            lambda resource: ActionClientSource(
+                self.board,
+                self._node(resource),
+                self.types.action(_required(resource.interface)),
+                _required(resource.ros_name),
+            ),
+        )
+
+    def writer(self, group: str, name: str, qos: QosProfile | None = None) -> TopicWriter:
+        """Return the publisher of that name; without `qos` reliable, volatile, the last 10."""
         resource = self._resource_of(group, name, "rospub")
         return TopicWriter(
             self.board,
             self._node(resource),
             self.types.message(_required(resource.interface)),
             _required(resource.ros_name),
+            qos,
         )
 
     def mbox(self, group: str, name: str) -> Mailbox:
@@ -113,6 +165,15 @@ class Application:
 
         return self._shared(group, name, "mem", allocate)
 
+    def parameters(self, group: str, name: str) -> Parameters:
+        """Return the parameters of the node (a rosnode) of that name, the same ones each time."""
+
+        def serve(resource: Resource) -> Parameters:
+            node = self._node_named(_required(resource.ros_name))
+            return Parameters(StackNode(self.board, node, node.name), self.types)
+
+        return self._shared(group, name, "rosnode", serve)
+
     def spin(self, executor: Executor) -> None:
         """Start the executor's workers; it is the one that the board reports on."""
         self.executor = executor
@@ -124,9 +185,9 @@ class Application:
             node.close()
 
     def _shared(self, group: str, name: str, kind: str, make: Callable[[Resource], T]) -> T:
-        if (group, name) not in self._os_resources:
-            self._os_resources[group, name] = make(self._resource_of(group, name, kind))
-        return cast("T", self._os_resources[group, name])
+        if (group, name) not in self._made:
+            self._made[group, name] = make(self._resource_of(group, name, kind))
+        return cast("T", self._made[group, name])
 
     def _resource_of(self, group: str, name: str, kind: str) -> Resource:
         resource = self._resource(group, name)
@@ -145,7 +206,9 @@ class Application:
             ) from None
 
     def _node(self, resource: Resource) -> Node:
-        name = _required(resource.node)
+        return self._node_named(_required(resource.node))
+
+    def _node_named(self, name: str) -> Node:
         if name not in self._nodes:
             namespace, _, base = name.rpartition("/")
             self._nodes[name] = self.board.context.node(base, namespace or "/")

@@ -12,6 +12,7 @@ from reconros_zenoh.clock.virtual import VirtualEnvironment
 from reconros_zenoh.errors import UsageError
 from reconros_zenoh.project.loader import load_project
 from reconros_zenoh.project.mapping_file import Mapping
+from reconros_zenoh.ros.qos import QosProfile, Reliability
 from reconros_zenoh.transport.simulated import SimulatedNetwork
 
 if TYPE_CHECKING:
@@ -40,6 +41,17 @@ lock = mutex
 changed = cond, lock
 free = sem, 3
 ram = mem, 16
+
+[ResourceGroup@ros]
+node = rosnode, "/robot/arm"
+word = rosmsg, std_msgs, msg, UInt32
+flip = rossrvmsg, std_srvs, srv, SetBool
+fibonacci = rosactionmsg, example_interfaces, action, Fibonacci
+sub = rossub, node, word, "in"
+pub = rospub, node, word, "out"
+ask = rossrvc, node, flip, "flip"
+act = rosactions, node, fibonacci, "serve"
+want = rosactionc, node, fibonacci, "want"
 """
 MAIN = "from reconros_zenoh.board.executor import Executor\ndef main(app):\n"
 MAIN += "    app.spin(Executor(app.board, 1, 1))\n"
@@ -81,6 +93,36 @@ def test_memory_is_the_same_in_software_and_at_its_address(app: Application) -> 
     assert space.read(memory.address, 64).view("<u4").tolist() == [0, 0, 0, 7] + [0] * 12
     space.write(memory.address, memory.words[3:4].view("u1").copy())
     assert memory.words[0] == 7
+
+
+def test_the_client_that_is_called_is_the_source_of_responses(app: Application) -> None:
+    assert app.client("ros", "ask") is app.source("ros", "ask")
+    assert app.action_client("ros", "want") is app.source("ros", "want")
+
+
+def test_endpoints_are_in_the_namespace_of_their_node(app: Application) -> None:
+    assert app.writer("ros", "pub")._publisher.name == "/robot/out"
+    assert app.client("ros", "ask")._client.name == "/robot/flip"
+    app.action_client("ros", "want")
+    source = app.source("ros", "act")
+    source.open(lambda: None, None)
+    app.parameters("ros", "node").declare("speed", 1)
+    tokens = app.board.context.transport.tokens("@ros2_lv/**", 0)
+    for name in ("%robot%serve%_action%send_goal", "%robot%want%_action%get_result"):
+        assert any(f"/{name}/" in token for token in tokens)
+    assert any("/%robot%arm%set_parameters/" in token for token in tokens)
+    assert app.parameters("ros", "node").get("speed") == 1
+
+
+def test_the_qos_of_a_topic_is_chosen_that_of_others_is_fixed(app: Application) -> None:
+    qos = QosProfile(Reliability.BEST_EFFORT, depth=1)
+    source = app.source("ros", "sub", qos)
+    source.open(lambda: None, None)
+    app.writer("ros", "pub", qos)
+    tokens = app.board.context.transport.tokens("@ros2_lv/**", 0)
+    assert sum(token.endswith(f"/{qos.encode()}") for token in tokens) == 2
+    with pytest.raises(UsageError, match="'act' of group 'ros' is a rosactions: its QoS is fixed"):
+        app.source("ros", "act", qos)
 
 
 def test_a_resource_of_another_type(app: Application) -> None:
