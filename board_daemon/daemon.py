@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import signal
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from board_daemon.hosting import HostedBoard
-from reconros_zenoh.board.control import ControlServer, claim_name
+from reconros_zenoh.board.control import ControlServer, claim_name, status
 from reconros_zenoh.clock.virtual import succeed_once
 from reconros_zenoh.clock.wall import WallEnvironment, keep_time
 from reconros_zenoh.transport.memory import tune_memory
@@ -28,10 +28,12 @@ def run_board(
     mapping: Mapping,
     options: BoardOptions,
     on_ready: Callable[[], None],
-) -> None:
-    """Return after SIGINT or SIGTERM, with everything closed; `on_ready` is called once the board serves.
+    seconds: float | None = None,
+) -> dict[str, Any]:
+    """Return the board's last status after SIGINT, SIGTERM or that many seconds, with everything closed.
 
-    Raise TransportError without a router, UsageError when the name is taken.
+    `on_ready` is called once the board serves. Raise TransportError without a router, UsageError when the
+    name is taken.
     """
     keep_time()
     tune_memory()
@@ -45,7 +47,10 @@ def run_board(
         control = ControlServer(hosted.board, hosted.executor)
         try:
             on_ready()
+            if seconds is not None:
+                environment.call_later(round(seconds * 1e9), succeed_once, stop)
             environment.run(until=stop)
+            return status(hosted.board, hosted.executor)
         finally:
             control.close()
             hosted.close()

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 from reconros_zenoh.board.board import Board
 from reconros_zenoh.clock.wall import WallEnvironment
-from reconros_zenoh.errors import UsageError
 from reconros_zenoh.project.application import Application
 from reconros_zenoh.rmw.node import Context
 
@@ -60,10 +59,7 @@ class HostedBoard:
             pointer_bytes=project.pointer_bytes,
         )
         self._application = Application(project, self.board, mapping, project.types(), options.bitstreams)
-        project.main(self._application)
-        if self._application.executor is None:
-            raise UsageError(f"{project.folder / 'main.py'}: main(app) does not call app.spin(executor).")
-        self.executor: Executor = self._application.executor
+        self.executor: Executor = project.start(self._application)
 
     def close(self) -> None:
         """Take the board's nodes out of the graph and let running computations end."""

@@ -17,6 +17,7 @@ from reconros_zenoh.board.quantity import (
     Fraction,
     Frequency,
     PositiveSize,
+    RetryProbability,
     Share,
     Size,
 )
@@ -32,7 +33,7 @@ _NATIVE_BITSTREAM_SIZE = 4096
 
 
 class _Section(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 
 
 class CoresSection(_Section):
@@ -80,7 +81,7 @@ class DdsSection(_Section):
     large_from: Size
     core_share: Share
     jitter: Fraction
-    nack_probability: Fraction
+    nack_probability: RetryProbability
     nack_delay: Duration
     loss_probability: Fraction
     heartbeat_period: Duration
@@ -150,7 +151,7 @@ class Model(_Section):
     icap: IcapSection
     memif: MemifSection
     osif: OsifSection
-    bitstreams: Annotated[tuple[BitstreamSection, ...], Field(min_length=1)]
+    bitstreams: Annotated[tuple[BitstreamSection, ...], Field(min_length=1, strict=False)]
     callbacks: dict[str, CallbackSection]
 
 

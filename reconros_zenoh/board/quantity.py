@@ -13,7 +13,7 @@ Basis = Literal["published", "calibrated", "assumed"]
 class Quantity(BaseModel):
     """A value, its unit, its basis, and where it comes from."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 
     value: Annotated[float, Field(ge=0, allow_inf_nan=False)]
     unit: str
@@ -112,6 +112,12 @@ class Share(Fraction):
     """A share of more than nothing."""
 
     value: Annotated[float, Field(gt=0, le=1, allow_inf_nan=False)]
+
+
+class RetryProbability(Fraction):
+    """The probability that something has to be done once more; at 1 it would never end."""
+
+    value: Annotated[float, Field(ge=0, lt=1, allow_inf_nan=False)]
 
 
 class Count(Quantity):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections import deque
 from typing import TYPE_CHECKING, Generic, TypeVar
 
@@ -13,13 +14,14 @@ if TYPE_CHECKING:
     from reconros_zenoh.clock.activity import Awaitable
 
 T = TypeVar("T")
+_log = logging.getLogger(__name__)
 
 
 class Stream(Generic[T]):
     """Hands items to a process in order: the next when it is done with the one before.
 
-    At most `depth` wait (None: any number); a further one pushes the oldest out (KEEP_LAST) and is counted in
-    `dropped`.
+    At most `depth` wait (None: any number); a further one pushes the oldest out (KEEP_LAST). `dropped` counts
+    what was pushed out, and the items whose process raised: that is logged, and the stream goes on.
     """
 
     def __init__(
@@ -27,8 +29,8 @@ class Stream(Generic[T]):
     ) -> None:
         self._process = process
         self._waiting: deque[T] = deque(maxlen=depth)
-        self._activity = Activity(self._run())
         self.dropped = 0
+        self._activity = Activity(self._run())
 
     def put(self, item: T) -> None:
         """Append an item."""
@@ -40,5 +42,9 @@ class Stream(Generic[T]):
     def _run(self) -> Generator[Awaitable | None, object, None]:
         while True:
             while self._waiting:
-                yield from self._process(self._waiting.popleft())
+                try:
+                    yield from self._process(self._waiting.popleft())
+                except Exception:  # noqa: BLE001 - one message must not end the stream
+                    self.dropped += 1
+                    _log.exception("a message was lost on its way through the board")
             yield None

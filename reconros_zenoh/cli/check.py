@@ -49,7 +49,7 @@ def check(
     path = project / "build.cfg" if project.is_dir() else project
     configuration = read_build_cfg(path)
     if project.is_dir():
-        read_interfaces(project)
+        read_interfaces(project).registry()
     if as_json:
         print(json.dumps(_as_json(configuration)))
         return

@@ -15,7 +15,7 @@ from reconros_zenoh.board.control import ask_status
 from reconros_zenoh.experiments.roundtrip import application_folder
 from reconros_zenoh.transport.zenoh import ZenohRouter, ZenohTransport
 
-_ENDPOINT = "tcp/127.0.0.1:7447"
+ENDPOINT = "tcp/127.0.0.1:7447"
 Router = Annotated[
     str, typer.Option(metavar="ENDPOINT", envvar="RECONROS_ROUTER", help="The Zenoh router to connect to.")
 ]
@@ -39,7 +39,7 @@ def router(
         typer.Option(
             metavar="ENDPOINT", help="Where to listen; tcp/[::]:7447 takes sessions of other hosts too."
         ),
-    ] = _ENDPOINT,
+    ] = ENDPOINT,
 ) -> None:
     """Run a Zenoh router until Ctrl-C; any rmw_zenoh router serves as well."""
     endings = {signal.SIGINT, signal.SIGTERM}
@@ -62,7 +62,7 @@ def board(
         str, typer.Option(metavar="NAME|FILE", help="The kind of board; native models nothing.")
     ] = "miniitx-zynq7100",
     name: Annotated[str, typer.Option(help="The board's name in the network.")] = "board0",
-    router: Router = _ENDPOINT,
+    router: Router = ENDPOINT,
     domain: Domain = 0,
     seed: Annotated[int, typer.Option(help="Seed of what is random in the model.")] = 0,
     bitstreams: Annotated[
@@ -92,7 +92,7 @@ def board(
 def client(
     name: Annotated[ClientName, typer.Argument(help="Which client.")],
     requests: Annotated[int, typer.Option(min=1, help="How many round trips to make.")] = 100,
-    router: Router = _ENDPOINT,
+    router: Router = ENDPOINT,
     domain: Domain = 0,
     limit: Annotated[
         float, typer.Option(min=0.001, metavar="SECONDS", help="After this time an answer is lost.")
@@ -120,7 +120,7 @@ def client(
 
 def status(
     name: Annotated[str, typer.Argument(help="The board, or `router`.")] = "board0",
-    router: Router = _ENDPOINT,
+    router: Router = ENDPOINT,
     as_json: AsJson = False,
 ) -> None:
     """Show what a board is doing; exit status 2 when it does not answer."""

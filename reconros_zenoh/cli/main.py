@@ -24,7 +24,9 @@ _VERBS = {
     "board": ("daemons", "board"),
     "client": ("daemons", "client"),
     "status": ("daemons", "status"),
+    "new": ("new", "new"),
     "check": ("check", "check"),
+    "run": ("run", "run"),
     "build": ("build", "build"),
 }
 """Each verb with its module in this package and its name there, in the order of `reconros --help`."""

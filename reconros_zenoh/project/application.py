@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, TypeVar, cast
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import numpy as np
 
 from reconros_zenoh.board.actions import ActionClientSource, ActionSource
 from reconros_zenoh.board.clients import ClientSource
 from reconros_zenoh.board.endpoints import ServiceSource, SubscriptionSource, TimerSource, TopicWriter
+from reconros_zenoh.board.executor import Executor
 from reconros_zenoh.board.os_resources import Condition, Mailbox, Mutex, Semaphore, SharedMemory
 from reconros_zenoh.board.stack_node import StackNode
 from reconros_zenoh.errors import UsageError
+from reconros_zenoh.executor.callbacks import CallbackKind
 from reconros_zenoh.rmw.parameters import Parameters
 
 if TYPE_CHECKING:
@@ -19,8 +21,10 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from reconros_zenoh.board.board import Board
+    from reconros_zenoh.board.callback import HardwareCallback
     from reconros_zenoh.board.endpoints import Source
-    from reconros_zenoh.board.executor import Executor
+    from reconros_zenoh.board.software import SoftwareCallback
+    from reconros_zenoh.board.timing import Timing
     from reconros_zenoh.project.loader import Project
     from reconros_zenoh.project.mapping_file import Mapping
     from reconros_zenoh.project.resource_groups import Resource
@@ -30,6 +34,14 @@ if TYPE_CHECKING:
 
 
 T = TypeVar("T")
+_KINDS = {
+    "rostmr": CallbackKind.TMR,
+    "rossub": CallbackKind.SUB,
+    "rossrvs": CallbackKind.SRV,
+    "rosactions": CallbackKind.SRV,
+    "rossrvc": CallbackKind.CLT,
+    "rosactionc": CallbackKind.CLT,
+}
 
 
 class Application:
@@ -47,6 +59,7 @@ class Application:
         self.types = types
         self.bitstreams = bitstreams
         self.executor: Executor | None = None
+        self._mapped: Executor | None = None
         self._resources = {
             (resource.group, resource.name): resource for resource in project.configuration.resources
         }
@@ -174,10 +187,58 @@ class Application:
 
         return self._shared(group, name, "rosnode", serve)
 
-    def spin(self, executor: Executor) -> None:
-        """Start the executor's workers; it is the one that the board reports on."""
-        self.executor = executor
-        executor.spin()
+    def register(
+        self,
+        name: str,
+        resource: str,
+        *,
+        software: SoftwareCallback | None = None,
+        hardware: HardwareCallback | None = None,
+        check: Callable[[Any], None] | None = None,
+        software_timing: Timing | None = None,
+        hardware_timing: Timing | None = None,
+        qos: QosProfile | None = None,
+    ) -> None:
+        """Let the callback `name` of build.cfg run where the mapping wants it, whenever `resource` is ready.
+
+        That is a subscription, service, action, client or timer of its resource groups; `check` raises
+        BadMessageError for bad messages; the timings say how long it takes where the profile's table does
+        not; `qos` is as in `source`. The executor is the one that the mapping describes; `spin` starts it.
+        """
+        threads = {thread.name: thread for thread in self.project.configuration.threads}
+        if name not in threads:
+            raise UsageError(
+                f"build.cfg has no callback {name!r}. Add `[ReconosThread@{name}]`, or give one of "
+                f"{', '.join(threads)}."
+            )
+        groups = threads[name].resource_groups
+        group = next((group for group in groups if (group, resource) in self._resources), None)
+        if group is None:
+            raise UsageError(
+                f"callback {name!r} has no resource {resource!r} in its groups, {', '.join(groups)}."
+            )
+        source = self.source(group, resource, qos)
+        kind = _KINDS[self._resources[group, resource].type]
+        executor = self._mapped = self._mapped or self._mapped_executor()
+        place = self.mapping.callbacks[name]
+        if place.software:
+            if software is None:
+                raise UsageError(f"callback {name!r} is mapped to software, but no `software` is given.")
+            executor.add_sw_callback(name, kind, source, software, check, software_timing)
+        if place.slots:
+            if hardware is None:
+                raise UsageError(f"callback {name!r} is mapped to hardware, but no `hardware` is given.")
+            executor.add_hw_callback(name, place.slots, kind, source, hardware, check, hardware_timing)
+
+    def spin(self, executor: Executor | None = None) -> None:
+        """Start the workers of an executor of one's own or of the one that `register` has filled.
+
+        It is the one that the board reports on.
+        """
+        self.executor = executor or self._mapped
+        if self.executor is None:
+            raise UsageError("app.spin() without a callback. Call app.register(...) first.")
+        self.executor.spin()
 
     def close(self) -> None:
         """Take the nodes out of the graph."""
@@ -194,6 +255,12 @@ class Application:
         if resource.type != kind:
             raise UsageError(f"resource {name!r} of group {group!r} is a {resource.type}, not a {kind}.")
         return resource
+
+    def _mapped_executor(self) -> Executor:
+        mapping = self.mapping
+        return Executor(
+            self.board, mapping.software_workers, mapping.hardware_workers, self.bitstreams, mapping.executor
+        )
 
     def _resource(self, group: str, name: str) -> Resource:
         try:

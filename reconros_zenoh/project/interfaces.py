@@ -6,10 +6,12 @@ import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from reconros_zenoh.errors import FileError
+from reconros_zenoh.errors import FileError, UsageError
 from reconros_zenoh.project.text_file import read_text_file
+from reconros_zenoh.ros.types import TypeRegistry
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
     from pathlib import Path
 
 # How many `---` lines divide a definition into its parts.
@@ -34,12 +36,28 @@ class Interfaces:
     texts: dict[str, str]
     paths: dict[str, Path]
 
+    def registry(self) -> TypeRegistry:
+        """Return a registry that knows them; `FileError` for a field whose type is not known."""
+        registry = TypeRegistry()
+        for name, text in self.texts.items():
+            try:
+                registry.add(name, text)
+            except FileError as error:
+                raise FileError(self.paths[name], error.line, error.problem, error.remedy) from error
+        for name, text in self.texts.items():
+            for line, message in _messages_in(name, text):
+                try:
+                    registry.message(message)
+                except UsageError as error:
+                    raise FileError(self.paths[name], line, str(error)) from error
+        return registry
+
 
 def read_interfaces(project_folder: Path) -> Interfaces:
     """Return the definitions in the folder `msg` of a project, none if there is no such folder.
 
     `FileError` names the file and the line of what is no definition, and a definition in the wrong place.
-    Whether the types of the fields exist is not looked up here.
+    Whether the types of the fields exist is looked up by `Interfaces.registry`.
     """
     root = project_folder / "msg"
     paths: dict[str, Path] = {}
@@ -86,6 +104,17 @@ def _check(path: Path, text: str) -> None:
             names.add(name)
     if separators < _SEPARATORS[kind]:
         raise _separator_error(path, None, kind)
+
+
+def _messages_in(name: str, text: str) -> Iterator[tuple[int, str]]:
+    """Yield the line and the type of each field that holds messages, in a text that is checked."""
+    package = name.split("/", maxsplit=1)[0]
+    for number, line in enumerate(text.split("\n"), start=1):
+        words = line.split("#")[0].split()
+        field_type = _FIELD_TYPE.fullmatch(words[0]) if words else None
+        if field_type is not None and not field_type["primitive"]:
+            message = words[0].split("[")[0]
+            yield number, message if "/" in message else f"{package}/{message}"
 
 
 def _separator_error(path: Path, line: int | None, kind: str) -> FileError:

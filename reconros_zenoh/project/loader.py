@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -12,19 +11,21 @@ from reconros_zenoh.board.board import SlotPlan
 from reconros_zenoh.errors import FileError, UsageError
 from reconros_zenoh.project.build_cfg import read_build_cfg
 from reconros_zenoh.project.interfaces import read_interfaces
-from reconros_zenoh.project.mapping_file import read_mapping
+from reconros_zenoh.project.main_file import load_main, running_project
+from reconros_zenoh.project.mapping_file import Mapping, bitstream_slots, read_mapping
 from reconros_zenoh.project.resources import slot_resources
-from reconros_zenoh.ros.types import TypeRegistry
+from reconros_zenoh.project.text_file import read_text_file
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
+    from reconros_zenoh.board.executor import Executor
     from reconros_zenoh.board.profile import Profile
     from reconros_zenoh.project.application import Application
     from reconros_zenoh.project.build_cfg import BuildConfiguration
     from reconros_zenoh.project.interfaces import Interfaces
-    from reconros_zenoh.project.mapping_file import Mapping
+    from reconros_zenoh.ros.types import TypeRegistry
 
 
 @dataclass(frozen=True)
@@ -63,30 +64,65 @@ class Project:
         """The size of a pointer on the board's processor."""
         return 8 if "64" in self.configuration.cpu_architecture else 4
 
+    def start(self, application: Application) -> Executor:
+        """Call main(app) and return the executor that it spins.
+
+        Raises FileError, with the line, for what goes wrong in the project's Python, for a callback that the
+        mapping places and that it does not add, and for one that it adds but build.cfg does not have.
+        """
+        with running_project(self.folder):
+            self.main(application)
+        path = self.folder / "main.py"
+        executor = application.executor
+        if executor is None:
+            raise FileError(path, None, "main(app) does not call app.spin().", "Call it last.")
+        added = executor.statistics()
+        for thread in self.configuration.threads:
+            place = application.mapping.callbacks[thread.name]
+            if (place.software or place.slots) and thread.name not in added:
+                raise FileError(
+                    self.configuration.path,
+                    thread.line,
+                    f"{path} adds no callback {thread.name!r}.",
+                    f'Add `app.register("{thread.name}", ...)` there, or take the section away.',
+                )
+        for name in added:
+            if name not in self.callbacks:
+                raise FileError(
+                    path,
+                    _line_that_names(path, name),
+                    f"The callback {name!r} is not in build.cfg.",
+                    f"Add a section `[ReconosThread@{name}]` there.",
+                )
+        return executor
+
     def types(self) -> TypeRegistry:
         """Return the registry that knows the project's interfaces, the same one each time."""
         return self._types
 
     @cached_property
     def _types(self) -> TypeRegistry:
-        registry = TypeRegistry()
-        for name, text in self.interfaces.texts.items():
-            try:
-                registry.add(name, text)
-            except FileError as error:
-                path = self.interfaces.paths[name]
-                raise FileError(path, error.line, error.problem, error.remedy) from error
-        return registry
+        return self.interfaces.registry()
 
-    def mapping(self, name_or_file: str) -> Mapping:
-        """Return the mapping of that name in the project's folder `mappings`, or the one in that file."""
+    def mapping(self, name_or_file: str | None) -> Mapping:
+        """Return the mapping of that name in the project's folder `mappings`, or the one in that file.
+
+        None stands for the first in the folder, or, if there is none, for the default.
+        """
+        if name_or_file is None:
+            shipped = self._mappings()
+            if not shipped:
+                return Mapping.default(self.configuration)
+            name_or_file = next(iter(shipped))
         return read_mapping(
-            self.mapping_path(name_or_file), self.callbacks, [slot.slot_id for slot in self.slots]
+            self.mapping_path(name_or_file),
+            bitstream_slots(self.configuration),
+            [slot.slot_id for slot in self.slots],
         )
 
     def mapping_path(self, name_or_file: str) -> Path:
         """Return where the mapping stands; raise UsageError when there is none of that name."""
-        shipped = {path.stem: path for path in sorted((self.folder / "mappings").glob("*.toml"))}
+        shipped = self._mappings()
         if name_or_file in shipped:
             return shipped[name_or_file]
         path = type(self.folder)(name_or_file)
@@ -96,15 +132,16 @@ class Project:
             )
         return path
 
+    def _mappings(self) -> dict[str, Path]:
+        return {path.stem: path for path in sorted((self.folder / "mappings").glob("*.toml"))}
+
     def bitstreams(self, profile: Profile) -> list[Bitstream]:
         """Return the bitstream of each callback for each slot it can be built for."""
         sizes = {slot.slot_id: profile.bitstream_size(slot.lut, slot.dsp, slot.bram36) for slot in self.slots}
         return [
-            Bitstream(slot, thread.name, sizes[slot])
-            for thread in self.configuration.threads
-            if thread.hardware is not None
-            for slot in thread.slots
-            if slot in sizes
+            Bitstream(slot, callback, sizes[slot])
+            for callback, slots in bitstream_slots(self.configuration).items()
+            for slot in slots
         ]
 
 
@@ -112,31 +149,9 @@ def load_project(folder: Path) -> Project:
     """Return the project in a folder; raise FileError for what is missing or wrong in it."""
     configuration = read_build_cfg(folder / "build.cfg")
     interfaces = read_interfaces(folder)
-    path = folder / "main.py"
-    if not path.is_file():
-        raise FileError(path, None, "is missing.", "Write a main.py with a function `main(app)`.")
-    spec = importlib.util.spec_from_file_location(f"reconros_project_{configuration.name}", path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    try:
-        spec.loader.exec_module(module)
-    except Exception as error:
-        raise FileError(path, _line_of(error, path), f"{type(error).__name__}: {error}.") from error
-    main = getattr(module, "main", None)
-    if not callable(main):
-        raise FileError(path, None, "has no function `main`.", "Write `def main(app): ...`.")
-    return Project(folder, configuration, interfaces, main)
+    return Project(folder, configuration, interfaces, load_main(folder, configuration.name))
 
 
-def _line_of(error: BaseException, path: Path) -> int | None:
-    """Return the line of the file in which the error was raised."""
-    if isinstance(error, SyntaxError) and error.filename == str(path):
-        return error.lineno
-    line = None
-    trace = error.__traceback__
-    while trace is not None:
-        if trace.tb_frame.f_code.co_filename == str(path):
-            line = trace.tb_lineno
-        trace = trace.tb_next
-    return line
+def _line_that_names(path: Path, name: str) -> int | None:
+    lines = enumerate(read_text_file(path).split("\n"), start=1)
+    return next((number for number, line in lines if f'"{name}"' in line or f"'{name}'" in line), None)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, StrictBool, StrictInt, ValidationError
 
@@ -11,7 +11,10 @@ from reconros_zenoh.toml_file import TomlFile
 
 if TYPE_CHECKING:
     from collections.abc import Collection
+    from collections.abc import Mapping as Map
     from pathlib import Path
+
+    from reconros_zenoh.project.build_cfg import BuildConfiguration
 
 _Count = Annotated[StrictInt, Field(ge=0)]
 
@@ -40,11 +43,36 @@ class Mapping(BaseModel):
     hardware_workers: _Count
     callbacks: dict[str, CallbackMapping]
 
+    @classmethod
+    def default(cls, configuration: BuildConfiguration) -> Self:
+        """Return the mapping of a project without mapping files: what can be in hardware is, all else not."""
+        slots = bitstream_slots(configuration)
+        return cls(
+            name="default",
+            executor="reconros",
+            software_workers=2,
+            hardware_workers=sum(slot.reconfigurable for slot in configuration.slots),
+            callbacks={
+                name: CallbackMapping(software=not built_for, slots=built_for)
+                for name, built_for in slots.items()
+            },
+        )
 
-def read_mapping(path: Path, callbacks: Collection[str], slots: Collection[int]) -> Mapping:
-    """Return the mapping in a TOML file, checked against the callbacks and the slot ids of its project.
 
-    `FileError` names the line of the first mistake. Each callback of the project has to be mapped.
+def bitstream_slots(configuration: BuildConfiguration) -> dict[str, tuple[int, ...]]:
+    """Return the ids of the reconfigurable slots that each callback is built for."""
+    reconfigurable = {slot.id for slot in configuration.slots if slot.reconfigurable}
+    return {
+        thread.name: tuple(slot for slot in thread.slots if slot in reconfigurable and thread.hardware)
+        for thread in configuration.threads
+    }
+
+
+def read_mapping(path: Path, callbacks: Map[str, Collection[int]], slots: Collection[int]) -> Mapping:
+    """Return the mapping in a TOML file, checked against its project.
+
+    `callbacks` are the project's callbacks with the ids of the slots that they have bitstreams for, `slots`
+    the ids of all slots. `FileError` names the line of the first mistake. Each callback has to be mapped.
     """
     toml = TomlFile.read(path)
     if "name" in toml.content:
@@ -56,7 +84,7 @@ def read_mapping(path: Path, callbacks: Collection[str], slots: Collection[int])
         )
     except ValidationError as error:
         raise _schema_error(toml, error) from None
-    for name, callback in mapping.callbacks.items():
+    for name in mapping.callbacks:
         if name not in callbacks:
             raise FileError(
                 path,
@@ -64,7 +92,7 @@ def read_mapping(path: Path, callbacks: Collection[str], slots: Collection[int])
                 f"The project has no callback {name!r}.",
                 f"Its callbacks: {', '.join(callbacks)}.",
             )
-        _check_callback(toml, mapping, name, callback, slots)
+        _check_callback(toml, mapping, name, slots, callbacks[name])
     missing = [name for name in callbacks if name not in mapping.callbacks]
     if missing:
         raise FileError(
@@ -77,8 +105,10 @@ def read_mapping(path: Path, callbacks: Collection[str], slots: Collection[int])
 
 
 def _check_callback(
-    toml: TomlFile, mapping: Mapping, name: str, callback: CallbackMapping, slots: Collection[int]
+    toml: TomlFile, mapping: Mapping, name: str, slots: Collection[int], built_for: Collection[int]
 ) -> None:
+    callback = mapping.callbacks[name]
+
     def error(key: list[str], problem: str, remedy: str) -> FileError:
         return FileError(toml.path, toml.line(["callbacks", name, *key]), problem, remedy)
 
@@ -92,6 +122,14 @@ def _check_callback(
             ["slots"],
             f"The callback {name} is mapped to the unknown slot {unknown[0]}.",
             f"Known slots: {', '.join(map(str, slots)) or 'none'}.",
+        )
+    unbuilt = [slot for slot in callback.slots if slot not in built_for]
+    if unbuilt:
+        raise error(
+            ["slots"],
+            f"The callback {name} is mapped to slot {unbuilt[0]}, for which its thread has no bitstream.",
+            f"It has bitstreams for: {', '.join(map(str, built_for)) or 'none'}; see HwSource and Slot of "
+            f"[ReconosThread@{name}] in build.cfg.",
         )
     if callback.slots and mapping.executor == "standard":
         raise error(

@@ -142,7 +142,25 @@ MISTAKES = {
         "nack_probability = { value = 0",
         "nack_probability = { value = 7",
         "nack_probability =",
-        "less than or equal to 1",
+        "Input should be less than 1",
+    ),
+    "resent for ever": (
+        "nack_probability = { value = 0.14",
+        "nack_probability = { value = 1",
+        "nack_probability =",
+        "Input should be less than 1",
+    ),
+    "a number in quotes": (
+        "value = 666",
+        'value = "666"',
+        "clock = { value",
+        "model.cores.clock.value: Input should be a valid number",
+    ),
+    "a yes or no in quotes": (
+        "stalled_by_reconfiguration = true",
+        'stalled_by_reconfiguration = "true"',
+        "stalled_by_reconfiguration =",
+        "model.dds.stalled_by_reconfiguration: Input should be a valid boolean",
     ),
     "unknown unit": (
         'value = 666, unit = "MHz"',

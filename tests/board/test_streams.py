@@ -8,6 +8,7 @@ from reconros_zenoh.board.stream import Stream
 from reconros_zenoh.clock.virtual import VirtualEnvironment
 
 if TYPE_CHECKING:
+    import pytest
     from small_board import Steps
 
 
@@ -67,3 +68,25 @@ def test_several_put_at_once_before_it_begins() -> None:
     slow.environment.run()
     assert len(slow.log) == 6
     assert slow.stream.dropped == 0
+
+
+def test_an_item_whose_process_raises_is_logged_and_counted_and_the_next_comes(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    environment = VirtualEnvironment()
+    done: list[str] = []
+
+    def process(item: str) -> Steps:
+        yield environment.timeout(100)
+        if item == "bad":
+            raise RuntimeError("no network")
+        done.append(item)
+
+    stream = Stream(process, 3)
+    for item in ("bad", "good", "bad"):
+        stream.put(item)
+    environment.call_later(1000, stream.put, "later")
+    environment.run()
+    assert done == ["good", "later"]
+    assert stream.dropped == 2
+    assert [str(record.exc_info[1]) for record in caplog.records if record.exc_info] == ["no network"] * 2

@@ -188,11 +188,8 @@ def test_a_service_that_waits_for_the_end_of_another_is_refused(tmp_path: Path) 
 def test_a_client_whom_nobody_answers_is_named(tmp_path: Path) -> None:
     project = tmp_path / "project"
     copytree(application_folder(), project)
-    (project / "main.py").write_text(
-        "from reconros_zenoh.board.executor import Executor\n"
-        "def main(app):\n    app.spin(Executor(app.board, 1, 4))\n",
-        encoding="utf-8",
-    )
+    path = project / "build.cfg"
+    path.write_text(path.read_text(encoding="utf-8").replace('"sorter"', '"other"'), encoding="utf-8")
     file = write_deployment(tmp_path, f"{BOARD} {project}", "reconros client sort --wait 5 --limit 1")
     with pytest.raises(TransportError, match="no board answered the sort client in domain 0 within 5 s"):
         run("-f", file, "--out", tmp_path / "out")
@@ -200,7 +197,9 @@ def test_a_client_whom_nobody_answers_is_named(tmp_path: Path) -> None:
 
 def test_a_board_that_cannot_host_its_project_is_named(tmp_path: Path) -> None:
     file = write_deployment(tmp_path, f"{BOARD} {ECHO} --mapping=software", "reconros client sort")
-    with pytest.raises(UsageError, match="s0: profile 'miniitx-zynq7100' has no times for callback 'number'"):
+    with pytest.raises(
+        UsageError, match=r"s0: .*/main\.py:20: profile 'miniitx-zynq7100' has no times for callback 'number'"
+    ):
         run("-f", file, "--out", tmp_path / "out")
 
 

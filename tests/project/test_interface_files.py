@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
 import pytest
 
 from reconros_zenoh.errors import FileError
@@ -107,3 +108,37 @@ def test_a_file_with_a_wrong_place_or_name(tmp_path: Path, name: str, problem: s
     with pytest.raises(FileError, match=problem) as caught:
         read_interfaces(tmp_path)
     assert caught.value.path == path
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "line", "said"),
+    [
+        ("a/msg/T.msg", "uint8 x\nPoint p  # of whom\n", 2, "'a/Point' is not known"),
+        ("a/msg/T.msg", "\ngeometry_msgs/Pint[3] p\n", 2, "geometry_msgs/msg/Point"),
+        ("a/srv/T.srv", "b/U x\n---\n", 1, "'b/U' is not known"),
+        ("a/action/T.action", "---\n---\nuint8 x\nb/U[<=4] y\n", 4, "'b/U' is not known"),
+        ("a/msg/T.msg", "T[] children\n", 1, "contains a/msg/T itself"),
+    ],
+)
+def test_a_field_of_an_unknown_type(tmp_path: Path, name: str, text: str, line: int, said: str) -> None:
+    path = write(tmp_path, name, text)
+    with pytest.raises(FileError) as caught:
+        read_interfaces(tmp_path).registry()
+    assert (caught.value.path, caught.value.line) == (path, line)
+    assert said in str(caught.value)
+
+
+def test_all_kinds_become_types(tmp_path: Path) -> None:
+    write(tmp_path, "a/msg/T.msg", "uint32 RED=1\nb/U[] us\nstd_msgs/Header header\n")
+    write(tmp_path, "b/msg/U.msg", "float64[] x\n")
+    write(tmp_path, "b/srv/Get.srv", "U u\n---\na/T t\n")
+    write(tmp_path, "b/action/Go.action", "int32 to\n---\nU[2] us\n---\nint32 at\n")
+    registry = read_interfaces(tmp_path).registry()
+    assert registry.service("b/srv/Get").response.name == "b/srv/Get_Response"
+    assert registry.action("b/Go").send_goal.dds_name == "b::action::dds_::Go_SendGoal_"
+    u = registry.message("b/U").cls(x=np.array([1.5]))
+    t = registry.message("a/T")
+    header = registry.message("std_msgs/Header").cls(
+        stamp=registry.message("builtin_interfaces/Time").cls(sec=1, nanosec=2), frame_id="f"
+    )
+    assert t.decode(b"".join(t.encode(t.cls(us=[u], header=header)))).us[0].x.tolist() == [1.5]

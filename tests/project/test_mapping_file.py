@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from reconros_zenoh.errors import FileError
+from reconros_zenoh.project.build_cfg import read_build_cfg
 from reconros_zenoh.project.mapping_file import CallbackMapping, Mapping, read_mapping
 
 if TYPE_CHECKING:
@@ -28,7 +29,7 @@ slots = [3]
 def read(tmp_path: Path, text: str) -> Mapping:
     path = tmp_path / "mine.toml"
     path.write_text(text, encoding="utf-8")
-    return read_mapping(path, ("sobel", "hash"), (2, 3))
+    return read_mapping(path, {"sobel": (2, 3), "hash": (3,)}, (2, 3))
 
 
 def test_a_mapping(tmp_path: Path) -> None:
@@ -54,6 +55,33 @@ def test_the_standard_executor_has_no_hardware_workers(tmp_path: Path) -> None:
     assert (mapping.executor, mapping.hardware_workers) == ("standard", 0)
 
 
+def test_without_a_file_what_can_be_in_hardware_is(tmp_path: Path) -> None:
+    path = tmp_path / "build.cfg"
+    path.write_text(
+        "[General]\nName = x\nPartialReconfiguration = true\n"
+        "[HwSlot@s(0:1)]\nId = 4\nReconfigurable = true\n"
+        "Region_0 = SLICE_X0Y0:SLICE_X1Y1\nRegion_1 = SLICE_X2Y0:SLICE_X3Y1\n"
+        "[HwSlot@fixed(0:0)]\nId = 9\n"
+        "[ReconosThread@both]\nSlot = s(*), fixed(0)\nHwSource = hls\nSwSource = c\n"
+        "[ReconosThread@soft]\nSlot = s(*)\nSwSource = c\n"
+        "[ReconosThread@static]\nSlot = fixed(0)\nHwSource = hls\n"
+        "[ReconosThread@nowhere]\nHwSource = hls\n",
+        encoding="utf-8",
+    )
+    assert Mapping.default(read_build_cfg(path)) == Mapping(
+        name="default",
+        executor="reconros",
+        software_workers=2,
+        hardware_workers=2,
+        callbacks={
+            "both": CallbackMapping(slots=(4, 5)),
+            "soft": CallbackMapping(software=True),
+            "static": CallbackMapping(software=True),
+            "nowhere": CallbackMapping(software=True),
+        },
+    )
+
+
 MISTAKES = {
     "syntax": (GOOD.replace("= 2\n", "= \n"), 2, "TOML"),
     "unknown key": ("workers = 2\n" + GOOD, 1, "workers: unknown key. Known keys: callbacks, executor"),
@@ -69,6 +97,11 @@ MISTAKES = {
     "slot that is no number": (GOOD.replace("[2, 3]", '["RS2"]'), 5, "valid integer"),
     "unknown callback": (GOOD.replace("sobel", "sobol"), 4, "'sobol'. Its callbacks: sobel, hash."),
     "unknown slot": (GOOD.replace("[2, 3]", "[2, 4]"), 5, "unknown slot 4. Known slots: 2, 3."),
+    "slot without a bitstream": (
+        GOOD.replace("[3]", "[2, 3]"),
+        9,
+        "slot 2, for which its thread has no bitstream. It has bitstreams for: 3;",
+    ),
     "no place": (GOOD.replace("slots = [2, 3]", "software = false"), 4, "no place"),
     "callback not mapped": (
         GOOD.split("[callbacks.hash]", maxsplit=1)[0],
@@ -94,4 +127,4 @@ def test_a_mistake_is_reported_with_its_line(
 
 def test_a_missing_file(tmp_path: Path) -> None:
     with pytest.raises(FileError, match="cannot be read"):
-        read_mapping(tmp_path / "none.toml", (), ())
+        read_mapping(tmp_path / "none.toml", {}, ())

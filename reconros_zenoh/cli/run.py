@@ -1,0 +1,114 @@
+"""`reconros run`: a project on a board of the kind that it is built for."""
+
+from __future__ import annotations
+
+import json
+import logging
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from rich.console import Console
+
+from board_daemon.hosting import BoardOptions
+from reconros_zenoh.board.control import status
+from reconros_zenoh.board.profile import profile_names, read_profile
+from reconros_zenoh.cli.daemons import ENDPOINT, AsJson, Domain, Router
+from reconros_zenoh.cli.options import ClockName
+from reconros_zenoh.errors import UsageError
+from reconros_zenoh.project.loader import load_project
+from reconros_zenoh.project.target import target_profile
+
+if TYPE_CHECKING:
+    from reconros_zenoh.board.profile import Profile
+    from reconros_zenoh.project.build_cfg import BuildConfiguration
+    from reconros_zenoh.project.loader import Project
+    from reconros_zenoh.project.mapping_file import Mapping
+
+_log = logging.getLogger(__name__)
+_VIRTUAL_S = 10.0
+
+
+def run(
+    project: Annotated[Path, typer.Argument(help="Folder of a ReconROS project.")],
+    mapping: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME|FILE",
+            help="Which callback runs where.",
+            show_default="the first in PROJECT/mappings; without any, in hardware what can be",
+        ),
+    ] = None,
+    profile: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME|FILE", help="The kind of board.", show_default="that of TargetBoard, or native"
+        ),
+    ] = None,
+    clock: Annotated[
+        ClockName, typer.Option(help="Real time, with a router; or virtual time, in this process alone.")
+    ] = ClockName.WALL,
+    seconds: Annotated[
+        float | None,
+        typer.Option(
+            min=0.001, help="How long.", show_default=f"until Ctrl-C, in virtual time {_VIRTUAL_S:g}"
+        ),
+    ] = None,
+    name: Annotated[str, typer.Option(help="The board's name in the network.")] = "board0",
+    router: Router = ENDPOINT,
+    domain: Domain = 0,
+    seed: Annotated[int, typer.Option(help="Seed of what is random in the model.")] = 0,
+    bitstreams: Annotated[
+        Path | None,
+        typer.Option(help="Folder of `reconros build`.", show_default="bitstreams held in memory"),
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Host a project on an emulated board of its TargetBoard, and show at the end what the board has done."""
+    if seconds is not None and not math.isfinite(seconds):
+        raise UsageError(f"--seconds {seconds}: give a number.")
+    loaded = load_project(project)
+    model = read_profile(profile or _profile_of(loaded.configuration))
+    mapped = loaded.mapping(mapping)
+    options = BoardOptions(name, domain, seed, bitstreams)
+    if clock is ClockName.VIRTUAL:
+        done = _run_virtual(model, loaded, mapped, options, seconds or _VIRTUAL_S)
+    else:
+        from board_daemon.daemon import run_board
+
+        def on_ready() -> None:
+            if not as_json:
+                print(
+                    f"board {name} serves {loaded.configuration.name} under {mapped.name} on {model.name}",
+                    flush=True,
+                )
+
+        done = run_board(router, model, loaded, mapped, options, on_ready, seconds)
+    if as_json:
+        print(json.dumps(done))
+    else:
+        Console().print(done)
+
+
+def _profile_of(configuration: BuildConfiguration) -> str:
+    found = target_profile(configuration, profile_names())
+    if found is None and (configuration.board or configuration.part):
+        _log.warning(
+            "there is no profile for the board of %s: it runs on native, which models nothing. "
+            "Choose one with --profile.",
+            configuration.path,
+        )
+    return found or "native"
+
+
+def _run_virtual(
+    profile: Profile, project: Project, mapping: Mapping, options: BoardOptions, seconds: float
+) -> dict[str, Any]:
+    """Return the status of the board after so many seconds of virtual time."""
+    from reconros_zenoh.experiments.simulation import Simulation
+
+    with Simulation(project.types()) as simulation:
+        hosted = simulation.add_board(profile, project, mapping, options)
+        simulation.environment.run(until=round(seconds * 1e9))
+        return status(hosted.board, hosted.executor)

@@ -1,0 +1,149 @@
+"""`reconros new` and `reconros run`: a project from nothing, and on which board it runs."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Any
+
+import pytest
+import typer
+from typer.testing import CliRunner
+
+from reconros_zenoh.cli.new import new
+from reconros_zenoh.cli.run import run as run_command
+from reconros_zenoh.errors import FileError, UsageError
+from reconros_zenoh.experiments.roundtrip import application_folder
+from reconros_zenoh.project.build_cfg import read_build_cfg
+from reconros_zenoh.project.target import target_profile
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+application = typer.Typer()
+application.command("new")(new)
+application.command("run")(run_command)
+
+
+def invoke(*arguments: object) -> str:
+    """Return what the command prints on stdout; raise what it raises."""
+    result = CliRunner().invoke(application, [str(argument) for argument in arguments])
+    if result.exception and not isinstance(result.exception, SystemExit):
+        raise result.exception
+    assert result.exit_code == 0, result.output
+    return result.stdout
+
+
+def run(*arguments: object) -> Any:
+    return json.loads(invoke("run", *arguments, "--clock", "virtual", "--json"))
+
+
+@pytest.fixture
+def blink(tmp_path: Path) -> Path:
+    invoke("new", tmp_path / "blink")
+    return tmp_path / "blink"
+
+
+def test_a_new_project_is_complete_and_clean(blink: Path) -> None:
+    assert sorted(str(path.relative_to(blink)) for path in blink.rglob("*") if path.is_file()) == [
+        "build.cfg",
+        "callbacks.py",
+        "main.py",
+        "mappings/hardware.toml",
+        "mappings/software.toml",
+        "msg/blink_msgs/msg/Count.msg",
+    ]
+    assert read_build_cfg(blink / "build.cfg").warnings == ()
+    assert len((blink / "main.py").read_text(encoding="utf-8").splitlines()) <= 10
+
+
+def test_it_runs_at_once_in_the_first_mapping_of_its_folder(
+    blink: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    status = run(blink, "--seconds", 1.05)
+    assert status["profile"] == "native"
+    count = status["callbacks"]["count"]
+    assert (count["kind"], count["software"], count["slots"]) == ("TMR", False, [0])
+    assert (count["calls"], count["failed"], count["dropped"]) == (10, 0, 0)
+    assert status["slots"][0]["holds"] == "count"
+    assert not caplog.records
+
+
+def test_it_runs_in_software(blink: Path) -> None:
+    assert run(blink, "--mapping", "software", "--seconds", 1.05)["callbacks"]["count"]["slots"] == []
+
+
+def test_without_mapping_files_what_can_be_runs_in_hardware(blink: Path) -> None:
+    for path in (blink / "mappings").iterdir():
+        path.unlink()
+    count = run(blink, "--seconds", 1.05)["callbacks"]["count"]
+    assert (count["software"], count["slots"], count["calls"]) == (False, [0], 10)
+
+
+def test_the_text_ends_with_the_status(blink: Path) -> None:
+    output = invoke("run", blink, "--clock", "virtual", "--seconds", 0.25)
+    assert "'calls': 2" in output
+
+
+def test_its_target_board_decides_on_the_profile() -> None:
+    assert run(application_folder(), "--seconds", 1)["profile"] == "miniitx-zynq7100"
+    assert run(application_folder(), "--seconds", 1, "--profile", "native")["profile"] == "native"
+
+
+def test_a_board_without_a_profile_is_warned_of(blink: Path, caplog: pytest.LogCaptureFixture) -> None:
+    path = blink / "build.cfg"
+    text = path.read_text(encoding="utf-8")
+    path.write_text(text.replace("TargetOS", "TargetBoard = zybo,b\nTargetOS"), encoding="utf-8")
+    assert run(blink, "--seconds", 1)["profile"] == "native"
+    assert "no profile for the board" in caplog.text
+
+
+@pytest.mark.parametrize(
+    ("general", "profile"),
+    [
+        ("TargetBoard = miniitx,zynq7100", "miniitx-zynq7100"),
+        ("TargetPart = XC7Z100ffg900-2", "miniitx-zynq7100"),
+        ("TargetBoard = zcu104,revd", "zcu104"),
+        ("TargetPart = xczu7ev-ffvc1156-2-e", "zcu104"),
+        ("TargetBoard = zedboard,c\nTargetPart = xc7z020clg484-1", None),
+        ("TargetOS = linux", None),
+    ],
+)
+def test_the_profile_of_a_board(tmp_path: Path, general: str, profile: str | None) -> None:
+    path = tmp_path / "build.cfg"
+    path.write_text(f"[General]\nName = x\n{general}\n", encoding="utf-8")
+    found = target_profile(read_build_cfg(path), ["miniitx-zynq7100", "native", "zcu104"])
+    assert found == profile
+    assert target_profile(read_build_cfg(path), ["native"]) is None
+
+
+def test_a_callback_without_times_is_refused_with_the_line_that_registers_it(blink: Path) -> None:
+    with pytest.raises(FileError, match=r"main\.py:8: .* has no times for callback 'count'"):
+        run(blink, "--profile", "miniitx-zynq7100")
+
+
+@pytest.mark.parametrize("name", ["Blink", "my-project", "2go", "a__b", "a_", "."])
+def test_names_that_a_project_cannot_have(tmp_path: Path, name: str) -> None:
+    with pytest.raises(UsageError, match="cannot name a project"):
+        invoke("new", f"{tmp_path}/{name}/" if name != "." else ".")
+
+
+def test_a_folder_that_is_there_is_left_alone(blink: Path) -> None:
+    (blink / "main.py").write_text("mine", encoding="utf-8")
+    with pytest.raises(UsageError, match="is there already"):
+        invoke("new", blink)
+    assert (blink / "main.py").read_text(encoding="utf-8") == "mine"
+
+
+def test_a_time_without_an_end(blink: Path) -> None:
+    with pytest.raises(UsageError, match="give a number"):
+        run(blink, "--seconds", "inf")
+
+
+def test_two_projects_with_modules_of_the_same_names_stay_apart(tmp_path: Path) -> None:
+    for name in ("one", "two"):
+        invoke("new", tmp_path / name)
+    path = tmp_path / "two" / "callbacks.py"
+    path.write_text(path.read_text(encoding="utf-8").replace("+= 1", "+= undefined"), encoding="utf-8")
+    assert run(tmp_path / "one", "--seconds", 1)["callbacks"]["count"]["failed"] == 0
+    assert run(tmp_path / "two", "--seconds", 1.05)["callbacks"]["count"]["failed"] == 10
+    assert run(tmp_path / "one", "--seconds", 1)["callbacks"]["count"]["failed"] == 0

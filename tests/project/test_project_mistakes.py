@@ -1,0 +1,160 @@
+"""Mistakes in the Python and the interfaces of a project: file, line and remedy."""
+
+from __future__ import annotations
+
+import sys
+from typing import TYPE_CHECKING
+
+import pytest
+
+from board_daemon.hosting import BoardOptions
+from reconros_zenoh.board.profile import read_profile
+from reconros_zenoh.errors import FileError
+from reconros_zenoh.experiments.simulation import Simulation
+from reconros_zenoh.project.loader import load_project
+from reconros_zenoh.project.template import new_project
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+
+def start(folder: Path) -> None:
+    """Put the project on a board."""
+    project = load_project(folder)
+    with Simulation(project.types()) as simulation:
+        simulation.add_board(read_profile("native"), project, project.mapping(None), BoardOptions())
+
+
+REGISTER = '    app.register("count", "timer", software=count.software, hardware=count.hardware)\n'
+
+# The file that is changed, what is replaced by what, the file and line that must be named, and what is said.
+MISTAKES = {
+    "syntax of main.py": ("main.py", "def main(app):", "def main(app:", "main.py:6", "SyntaxError"),
+    "syntax of another module": (
+        "callbacks.py",
+        "class Count:",
+        "class Count",
+        "callbacks.py:4",
+        "SyntaxError",
+    ),
+    "import that does not exist": (
+        "main.py",
+        "from callbacks import Count",
+        "from callback import Count",
+        "main.py:3",
+        "ModuleNotFoundError: No module named 'callback'",
+    ),
+    "error while importing": (
+        "callbacks.py",
+        '"""What',
+        '1 / 0\n"""What',
+        "callbacks.py:1",
+        "ZeroDivisionError",
+    ),
+    "no main": ("main.py", "def main", "def start", "main.py", "has no function `main`"),
+    "error in main": ("main.py", "app.spin()", "app.spin(1, 2)", "main.py:9", "TypeError"),
+    "error in a function that main calls": (
+        "callbacks.py",
+        "self.count = 0",
+        "self.count = zero",
+        "callbacks.py:9",
+        "NameError",
+    ),
+    "unknown resource": ("main.py", '"pub"', '"publisher"', "main.py:7", "no resource 'publisher'"),
+    "unknown resource of a callback": (
+        "main.py",
+        '"timer"',
+        '"tick"',
+        "main.py:8",
+        "no resource 'tick' in its groups",
+    ),
+    "resource that makes nothing ready": (
+        "main.py",
+        '"timer"',
+        '"pub"',
+        "main.py:8",
+        "makes no callback ready",
+    ),
+    "no hardware": ("main.py", ", hardware=count.hardware", "", "main.py:8", "mapped to hardware, but no"),
+    "no spin": ("main.py", "    app.spin()\n", "", "main.py", "does not call app.spin()"),
+    "spin without a callback": ("main.py", REGISTER, "", "main.py:8", "without a callback"),
+    "callback that is not in build.cfg": (
+        "main.py",
+        'register("count"',
+        'register("counter"',
+        "main.py:8",
+        "build.cfg has no callback 'counter'. Add `[ReconosThread@counter]`",
+    ),
+    "callback that is not in main.py": (
+        "build.cfg",
+        "[ReconosThread@count]",
+        "[ReconosThread@idle]\nSwSource = c\n[ReconosThread@count]",
+        "build.cfg:24",
+        "adds no callback 'idle'",
+    ),
+    "syntax of a message": (
+        "msg/blink_msgs/msg/Count.msg",
+        "uint32",
+        "uint33",
+        "Count.msg:1",
+        "'uint33' is no type",
+    ),
+    "wide string": (
+        "msg/blink_msgs/msg/Count.msg",
+        "uint32",
+        "wstring",
+        "Count.msg:1",
+        "wstring is not supported",
+    ),
+}
+
+
+@pytest.mark.parametrize(("file", "old", "new", "place", "said"), MISTAKES.values(), ids=MISTAKES)
+def test_a_mistake_is_named_with_its_place(
+    tmp_path: Path, file: str, old: str, new: str, place: str, said: str
+) -> None:
+    folder = tmp_path / "blink"
+    new_project(folder)
+    path = folder / file
+    text = path.read_text(encoding="utf-8")
+    assert text.count(old) == 1
+    path.write_text(text.replace(old, new), encoding="utf-8")
+    if "idle" in new:
+        (folder / "mappings" / "hardware.toml").unlink()
+        (folder / "mappings" / "software.toml").unlink()
+    modules, places = set(sys.modules), list(sys.path)
+    with pytest.raises(FileError) as caught:
+        start(folder)
+    assert f"/{place}: " in str(caught.value)
+    assert said in str(caught.value)
+    assert "callbacks" not in set(sys.modules) - modules
+    assert sys.path == places
+
+
+def test_a_callback_of_ones_own_executor_that_is_not_in_build_cfg(tmp_path: Path) -> None:
+    folder = tmp_path / "blink"
+    new_project(folder)
+    (folder / "main.py").write_text(
+        "from reconros_zenoh.board.executor import Executor\n"
+        "from reconros_zenoh.executor.callbacks import CallbackKind\n"
+        "def main(app):\n"
+        "    executor = Executor(app.board, 1, 0)\n"
+        "    for name in ('count', 'extra'):\n"
+        "        executor.add_sw_callback(\n"
+        "            name, CallbackKind.TMR, app.source('count', 'timer'), print\n"
+        "        )\n"
+        "    app.spin(executor)\n",
+        encoding="utf-8",
+    )
+    with pytest.raises(
+        FileError, match=r"main\.py:5: The callback 'extra' is not in build\.cfg\. Add a section"
+    ):
+        start(folder)
+
+
+def test_a_project_by_a_relative_path(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    new_project(tmp_path / "blink")
+    (tmp_path / "blink" / "callbacks.py").write_text("1 / 0\n", encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(FileError, match=r"^blink/callbacks\.py:1: ZeroDivisionError"):
+        load_project(tmp_path.joinpath("blink").relative_to(tmp_path))
