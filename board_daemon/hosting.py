@@ -56,6 +56,7 @@ class HostedBoard:
             name=options.name,
             seed=options.seed,
             threads=threads,
+            pointer_bytes=project.pointer_bytes,
         )
         self._application = Application(project, self.board, mapping, project.types(), options.bitstreams)
         self.executor: Executor = project.start(self._application)

@@ -7,6 +7,8 @@ ReconrosError
 │   └── GraphError         a computation graph that cannot be, with the place of the mistake in it
 ├── TransportError         the network did not do what was asked (no router, port in use, closed)
 ├── BadMessageError        a message that is counted and dropped; never ends a process
+├── CallbackError          a callback that did what it may not; it is failed, the board goes on
+│   └── PageFaultError     the same, at an address where its memory does not reach
 └── ExperimentError        an experiment that could not be completed
 """
 
@@ -72,6 +74,21 @@ class BadMessageError(ReconrosError):
         self.reason = reason
         self.detail = detail
         super().__init__(f"{reason}: {detail}")
+
+
+class CallbackError(ReconrosError):
+    """A callback did what it may not: it is counted and logged as failed, its worker goes on."""
+
+
+class PageFaultError(CallbackError):
+    """A callback read or wrote where no memory of its own is; `address` is where it began."""
+
+    def __init__(self, callback: str, slot: int, access: str, address: int, size: int) -> None:
+        self.address = address
+        super().__init__(
+            f"page fault: callback {callback} in slot {slot} cannot {access} {size} bytes at {address:#x}, "
+            "which do not lie in one block of its memory. Check the offset, the length and the pointer."
+        )
 
 
 class ExperimentError(ReconrosError):

@@ -6,6 +6,7 @@ import random
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from reconros_zenoh.board.address_space import AddressSpace
 from reconros_zenoh.board.cpu import Cpu
 from reconros_zenoh.board.dds import DdsStack
 from reconros_zenoh.board.host import IN_LINE_NS, Host
@@ -23,14 +24,22 @@ if TYPE_CHECKING:
     from reconros_zenoh.rmw.node import Context
 
 
+_ANY_CLOCK_HZ = 1e9
+"""Where nothing is modelled no cycle is counted."""
+
+
 @dataclass(frozen=True, slots=True)
 class SlotPlan:
-    """A slot as the project declares it, with the resources of its regions."""
+    """A slot as the project declares it, with the resources of its regions.
+
+    Without `clock_hz` it has the profile's clock for hardware threads.
+    """
 
     slot_id: int
     lut: int
     dsp: int
     bram36: int
+    clock_hz: int | None = None
 
 
 class Board:
@@ -50,6 +59,7 @@ class Board:
         name: str = "board0",
         seed: int = 0,
         threads: int | None = None,
+        pointer_bytes: int = 4,
     ) -> None:
         """`threads` run the computations in wall time; None: they run in line, in virtual time."""
         model = profile.model
@@ -59,6 +69,7 @@ class Board:
         self.name = name
         self.cpu = Cpu(environment, int(model.cores.count.value) if model else 1)
         self.memif = Memif(environment, model.memif.bandwidth.bytes_per_ns if model else None)
+        self.memory = AddressSpace(pointer_bytes)
         self.osif = Osif(self.cpu, model.osif.call.ns if model else 0)
         self.zycap = ZyCAP(environment, self.cpu, model.icap if model else None, model.dds if model else None)
         self.randomness = random.Random(f"{seed} {name}")
@@ -68,7 +79,9 @@ class Board:
         self.spans = Spans()
         self.slots: Mapping[int, ReconfigurableSlot] = {
             plan.slot_id: ReconfigurableSlot(
-                plan.slot_id, profile.bitstream_size(plan.lut, plan.dsp, plan.bram36)
+                plan.slot_id,
+                profile.bitstream_size(plan.lut, plan.dsp, plan.bram36),
+                plan.clock_hz or (model.fabric.thread_clock.hz if model else _ANY_CLOCK_HZ),
             )
             for plan in slots
         }

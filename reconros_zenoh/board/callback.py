@@ -1,30 +1,38 @@
-"""What a callback is written against, in software and in hardware."""
+"""What a hardware callback is written against."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar, overload
+
+import numpy as np
+
+from reconros_zenoh.board.address_space import PlacedMessage, UnmappedError
+from reconros_zenoh.board.delegate_calls import DelegateCalls
+from reconros_zenoh.board.host import measured
+from reconros_zenoh.board.timing import cycles_ns
+from reconros_zenoh.errors import PageFaultError
+from reconros_zenoh.ros.c_layout import is_number, number
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator
 
-    import numpy as np
+    from numpy.typing import NDArray
 
+    from reconros_zenoh.board.actions import ActionClientSource
     from reconros_zenoh.board.bitstream import Bitstream
-    from reconros_zenoh.board.endpoints import TopicWriter
-    from reconros_zenoh.board.host import Host
-    from reconros_zenoh.board.memif import Memif
-    from reconros_zenoh.board.osif import Osif
-    from reconros_zenoh.board.spans import Timeline
+    from reconros_zenoh.board.board import Board
+    from reconros_zenoh.board.endpoints import Event
+    from reconros_zenoh.board.slots import ReconfigurableSlot
+    from reconros_zenoh.board.software import Outlet
+    from reconros_zenoh.board.timing import ExecutionTime
     from reconros_zenoh.clock.activity import Awaitable
-    from reconros_zenoh.clock.virtual import VirtualEnvironment
-    from reconros_zenoh.transport.base import Parts
+    from reconros_zenoh.rmw.action_server import GoalHandle
+    from reconros_zenoh.ros.types import MessageType
 
 R = TypeVar("R")
-
-SoftwareCallback: TypeAlias = "Callable[[Any, SoftwareContext], object]"
-"""Called with the message (None for a timer); a service server's callback returns the response."""
+Array: TypeAlias = "np.ndarray[Any, Any]"
 
 HardwareCallback: TypeAlias = "Callable[[HardwareThread], Generator[Awaitable, object, object]]"
 """A generator; a service server's callback returns the response."""
@@ -36,33 +44,68 @@ class HardwareImplementation:
 
     bitstream: Bitstream
     callback: HardwareCallback
+    time: ExecutionTime
 
 
-@dataclass(frozen=True, slots=True)
-class Publication:
-    """A message that a callback published, encoded."""
+class ThreadExit(Exception):  # noqa: N818 - it ends the callback as SystemExit ends a program
+    """Ends a hardware callback with what it answers."""
 
-    writer: TopicWriter
-    parts: Parts
-
-
-class SoftwareContext:
-    """What a software callback can do besides computing; it belongs to one call of it, in one thread."""
-
-    def __init__(self, host: Host) -> None:
-        self._host = host
-        self.publications: list[Publication] = []
-
-    def compute(self, kernel: Callable[..., R], *arguments: object) -> R:
-        """Return `kernel(*arguments)` of a pure kernel, which need not be computed twice in virtual time."""
-        return self._host.compute(kernel, *arguments)
-
-    def publish(self, writer: TopicWriter, message: object) -> None:
-        """Publish the message once the callback has run to completion."""
-        self.publications.append(Publication(writer, writer.encode(message)))
+    def __init__(self, response: object) -> None:
+        super().__init__()
+        self.response = response
 
 
-class HardwareThread:
+class InitData:
+    """The message that started a callback: its fields, and its address in main memory as a C struct.
+
+    `init + 8` and `thread.mem_read(init, 4)` use the address. The struct is laid out on first use.
+    """
+
+    def __init__(self, message: Any, message_type: MessageType, board: Board) -> None:
+        self.message = message
+        self._type = message_type
+        self._board = board
+        self._placed: PlacedMessage | None = None
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.message, name)
+
+    def __add__(self, offset: int) -> int:
+        return self.address + offset
+
+    def __index__(self) -> int:
+        return self.address
+
+    @property
+    def address(self) -> int:
+        """The address of the struct; it is gone when the callback has ended."""
+        if self._placed is None:
+            self._placed = self._board.memory.place(self._type, self.message)
+        return self._placed.address
+
+    def array(self, path: str) -> Array:
+        """Return a field, `data` or `header.stamp.sec`, as an array; a number as an array of one."""
+        message, message_type = self.message, self._type
+        *messages, last = path.split(".")
+        for name in messages:
+            message = getattr(message, name)
+            message_type = message_type.nested(str(dict(message_type.fields)[name][1]))
+        form = dict(message_type.fields)[last]
+        dtype = number(form) if is_number(form) else None
+        return np.atleast_1d(np.asarray(getattr(message, last), dtype))
+
+    def in_memory(self) -> Any:
+        """Return the message as it stands in memory: with what the callback has written."""
+        return self.message if self._placed is None else self._placed.load()
+
+    def release(self) -> None:
+        """Take the struct out of memory."""
+        if self._placed is not None:
+            self._placed.unmap()
+            self._placed = None
+
+
+class HardwareThread(DelegateCalls):
     """The interface of a hardware thread: one MEMIF, one OSIF, and the computation in between.
 
     A hardware callback is a generator over it, written like the listings of the paper:
@@ -71,56 +114,170 @@ class HardwareThread:
     """
 
     def __init__(
-        self,
-        environment: VirtualEnvironment,
-        message: object,
-        *,
-        memif: Memif,
-        osif: Osif,
-        host: Host,
-        compute_ns: int | None,
-        timeline: Timeline,
+        self, board: Board, callback: str, slot: ReconfigurableSlot, event: Event, time: ExecutionTime
     ) -> None:
-        self._environment = environment
-        self._message = message
-        self._memif = memif
-        self._osif = osif
-        self._host = host
-        self._compute_ns = compute_ns
-        self._timeline = timeline
+        super().__init__(board.osif, event.timeline)
+        self._board = board
+        self._environment = board.environment
+        self._callback = callback
+        self._slot = slot
+        self._time = time
+        self._message = (
+            event.message
+            if event.message_type is None
+            else InitData(event.message, event.message_type, board)
+        )
 
     def get_init_data(self) -> Generator[Awaitable, object, Any]:
-        """Return the message that the callback was started with: THREAD_GETINITDATA."""
-        yield from self._osif.call()
-        self._timeline.mark("osif")
+        """Return what the callback was started with, a message with its address: THREAD_GETINITDATA.
+
+        A message of a topic or a request of a service is an `InitData`; a timer's is None.
+        """
+        yield from self._call()
         return self._message
 
-    def mem_read(self, data: np.ndarray[Any, Any]) -> Generator[Awaitable, object, np.ndarray[Any, Any]]:
-        """Return the array once it has come from main memory into the slot: MEM_READ."""
-        yield from self._memif.transfer(data.nbytes)
+    def offsetof(self, message_type: MessageType, path: str) -> int:
+        """Return where a field stands in the C struct of a message, as `CLayout.offsetof`: OFFSETOF."""
+        return self._board.memory.layout.offsetof(message_type, path)
+
+    @overload
+    def mem_read(self, source: Array) -> Generator[Awaitable, object, Array]: ...
+    @overload
+    def mem_read(
+        self, source: int | np.integer[Any] | InitData, size: int
+    ) -> Generator[Awaitable, object, NDArray[np.uint32]]: ...
+    @overload
+    def mem_read(
+        self, source: int | np.integer[Any] | InitData, size: int, dtype: type[np.generic]
+    ) -> Generator[Awaitable, object, Array]: ...
+    def mem_read(
+        self,
+        source: Array | int | np.integer[Any] | InitData,
+        size: int | None = None,
+        dtype: type[np.generic] = np.uint32,
+    ) -> Generator[Awaitable, object, Array]:
+        """Return the array once it has come from main memory into the slot: MEM_READ.
+
+        The source is an array, such as a field of the message, or an address: then `size` bytes from there on
+        come as numbers of `dtype`. Raises PageFaultError for bytes that are not all in one block of memory.
+        """
+        if isinstance(source, np.ndarray):
+            data: Array = source
+        else:
+            assert size is not None
+            # What the slot holds does not change with the memory.
+            data = self._mapped(int(source), size).view(dtype).copy()
+        yield from self._board.memif.transfer(data.nbytes)
         self._timeline.mark("memif")
         return data
 
-    def mem_write(self, data: np.ndarray[Any, Any]) -> Generator[Awaitable, object, None]:
-        """Return when the array has gone from the slot to main memory: MEM_WRITE."""
-        yield from self._memif.transfer(data.nbytes)
+    def mem_write(
+        self, data: Array, to: int | np.integer[Any] | InitData | None = None
+    ) -> Generator[Awaitable, object, None]:
+        """Return when the array has gone from the slot to main memory: MEM_WRITE.
+
+        `to` is the address of its first byte; without one it is what the callback publishes or returns next.
+        Raises PageFaultError for bytes that are not all in one block of memory.
+        """
+        if to is not None:
+            content = np.ascontiguousarray(data).reshape(-1).view(np.uint8)
+            try:
+                self._board.memory.write(int(to), content)
+            except UnmappedError:
+                raise self._page_fault("write", int(to), len(content)) from None
+        yield from self._board.memif.transfer(data.nbytes)
         self._timeline.mark("memif")
 
     def compute(self, kernel: Callable[..., R], *arguments: object) -> Generator[Awaitable, object, R]:
         """Return `kernel(*arguments)` of a pure kernel when the slot has computed it."""
-        future = self._host.start(kernel, partial(self._host.compute, kernel, *arguments))
-        if self._compute_ns is None:
-            result: R = yield from self._host.result(future)
+        host = self._board.host
+        if self._time.ns is None and self._time.modelled:
+            return (yield from self._compute_as_measured(kernel, *arguments))
+        future = host.start(kernel, partial(host.compute, kernel, *arguments))
+        if self._time.ns is None:
+            result: R = yield from host.result(future)
             self._timeline.mark("execution")
             return result
-        yield self._environment.timeout(self._compute_ns)
+        yield self._environment.timeout(self._time.ns)
         self._timeline.mark("execution")
-        result = yield from self._host.late_result(future)
+        result = yield from host.late_result(future)
         self._timeline.mark("overrun")
         return result
 
-    def publish(self, writer: TopicWriter, message: object) -> Generator[Awaitable, object, None]:
-        """Publish the message through the delegate: ROS_PUBLISHER_PUBLISH."""
-        yield from self._osif.call()
-        self._timeline.mark("osif")
-        writer.send(writer.encode(message), self._timeline.fork())
+    def compute_cycles(self, cycles: int) -> Generator[Awaitable, object, None]:
+        """Return when so many cycles of the slot's clock have passed; at once where nothing is modelled."""
+        if self._time.modelled:
+            yield self._environment.timeout(cycles_ns(cycles, self._slot.clock_hz))
+            self._timeline.mark("execution")
+
+    def publish(self, writer: Outlet, message: object) -> Generator[Awaitable, object, None]:
+        """Publish the message through the delegate: ROS_PUBLISHER_PUBLISH.
+
+        The init data is published as it stands in memory, with what the callback has written there.
+        """
+        yield from self._call()
+        parts = writer.encode(self._in_memory(message) if isinstance(message, InitData) else message)
+        writer.send(parts, self._timeline.fork())
+
+    def call(self, client: Outlet, request: object) -> Generator[Awaitable, object, None]:
+        """Call a service through the delegate; its response starts a CLT callback."""
+        return self.publish(client, request)
+
+    def send_goal(self, client: ActionClientSource, goal: object) -> Generator[Awaitable, object, bytes]:
+        """Send the goal through the delegate and return its id; what becomes of it starts a CLT callback."""
+        yield from self._call()
+        goal_id = client.new_goal_id()
+        client.send_goal(goal, goal_id)
+        return goal_id
+
+    def cancel_goal(self, client: ActionClientSource, goal_id: bytes) -> Generator[Awaitable, object, None]:
+        """Ask through the delegate for a goal to end early."""
+        yield from self._call()
+        client.cancel_goal(goal_id)
+
+    def feedback(self, handle: GoalHandle, feedback: object) -> Generator[Awaitable, object, None]:
+        """Publish feedback on the goal that the callback serves through the delegate."""
+        yield from self._call()
+        handle.feedback(feedback)
+
+    def is_cancel_requested(self, handle: GoalHandle) -> Generator[Awaitable, object, bool]:
+        """Ask the delegate whether the goal that the callback serves shall end early."""
+        yield from self._call()
+        return handle.is_cancel_requested
+
+    def exit(self, response: object = None) -> Generator[Awaitable, object, None]:
+        """End the callback, whose answer is `response`: THREAD_EXIT. What stands behind it does not run."""
+        yield from self._call()
+        raise ThreadExit(response)
+
+    def close(self) -> None:
+        """Give back what the call has taken; called when the callback has ended in any way."""
+        self.release_mutexes()
+        if isinstance(self._message, InitData):
+            self._message.release()
+
+    def _compute_as_measured(
+        self, kernel: Callable[..., R], *arguments: object
+    ) -> Generator[Awaitable, object, R]:
+        host, started_ns = self._board.host, self._environment.now
+        future = host.start(kernel, partial(host.compute, measured, kernel, *arguments))
+        result: R
+        result, took_ns = yield from host.result(future)
+        yield from host.until(started_ns + round(took_ns * self._time.factor))
+        self._timeline.mark("execution")
+        return result
+
+    def _in_memory(self, init: InitData) -> Any:
+        try:
+            return init.in_memory()
+        except UnmappedError:
+            raise self._page_fault("publish", init.address, 0) from None
+
+    def _mapped(self, address: int, size: int) -> NDArray[np.uint8]:
+        try:
+            return self._board.memory.read(address, size)
+        except UnmappedError:
+            raise self._page_fault("read", address, size) from None
+
+    def _page_fault(self, access: str, address: int, size: int) -> PageFaultError:
+        return PageFaultError(self._callback, self._slot.slot_id, access, address, size)

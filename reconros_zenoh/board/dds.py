@@ -75,14 +75,17 @@ class DdsStack:
             self._loss_probability_busy = dds.loss_probability_busy.share
             self._heartbeat_ns = dds.heartbeat_period.ns
 
-    def receive(self, size: int, transit_ns: int, timeline: Timeline) -> Generator[Awaitable, object, None]:
+    def receive(
+        self, size: int, transit_ns: int, timeline: Timeline, *, reliable: bool = True
+    ) -> Generator[Awaitable, object, bool]:
         """Return when a message of `size` bytes has come through the stack.
 
-        It left when its timeline started and was in the real network for `transit_ns`.
+        It left when its timeline started and was in the real network for `transit_ns`. False: a fragment of
+        it was lost, and without reliability nobody sends it again.
         """
         if not self._modelled:
             timeline.mark("transport")
-            return
+            return True
         large = size > self._large_from
         known_ns = min(max(0, transit_ns), self._link_ns(size))
         self._transit_ns[large] += (known_ns - self._transit_ns[large]) / _TRANSITS_REMEMBERED
@@ -92,8 +95,9 @@ class DdsStack:
         probability = self._loss_probability_busy if self._cpu.is_busy else self._loss_probability
         yield from self._process(size, self._receive_ns_per_byte)
         timeline.mark("dds")
-        if size > self._large_from:
-            yield from self._repair(size, timeline, probability)
+        return size <= self._large_from or (
+            yield from self._repair(size, timeline, probability, reliable=reliable)
+        )
 
     def send(self, size: int, timeline: Timeline) -> Generator[Awaitable, object, None]:
         """Return when a message of `size` bytes has gone through the stack and over the link."""
@@ -129,9 +133,12 @@ class DdsStack:
         passage.done.fire()
 
     def _repair(
-        self, size: int, timeline: Timeline, loss_probability: float
-    ) -> Generator[Awaitable, object, None]:
-        """Return when no fragment of a large message that came in is missing any more."""
+        self, size: int, timeline: Timeline, loss_probability: float, *, reliable: bool
+    ) -> Generator[Awaitable, object, bool]:
+        """Return when no fragment of a large message is missing any more; False when one is for ever."""
+        if not reliable:
+            lost = self._randomness.random() < loss_probability
+            return not lost and self._randomness.random() >= self._nack_probability
         if self._randomness.random() < loss_probability:
             yield self._environment.timeout(round(self._randomness.uniform(0, self._heartbeat_ns)))
             timeline.mark("retransmission")
@@ -139,3 +146,4 @@ class DdsStack:
             yield self._environment.timeout(self._nack_delay_ns)
             yield from self._process(size, self._receive_ns_per_byte)
             timeline.mark("retransmission")
+        return True

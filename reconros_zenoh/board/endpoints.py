@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from reconros_zenoh.board.spans import Timeline
 from reconros_zenoh.board.stream import Stream
-from reconros_zenoh.ros.qos import QosProfile
+from reconros_zenoh.ros.qos import QosProfile, Reliability
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator
@@ -26,11 +26,15 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """What a worker takes: the message of the callback (None for a timer) and its timeline so far."""
+    """What a worker takes: the message of the callback (None for a timer) and its timeline so far.
+
+    `message_type` is None for what has no place in memory as a C struct.
+    """
 
     message: Any
     timeline: Timeline
     responder: Responder | None = None
+    message_type: MessageType | None = None
 
 
 class Source(Protocol):
@@ -59,20 +63,25 @@ class Source(Protocol):
 class Reader:
     """The queue of messages behind the communication stack: base of subscriptions and service servers.
 
-    It keeps the last `depth` messages (KEEP_LAST) and counts in `dropped` what it pushed out.
+    It keeps the last `depth` messages (KEEP_LAST) or all (KEEP_ALL), and counts in `dropped` what it pushed
+    out or, with best effort, lost.
     """
 
-    def __init__(self, board: Board, depth: int) -> None:
+    def __init__(self, board: Board, message_type: MessageType, qos: QosProfile) -> None:
+        depth = qos.queue_depth
         self._board = board
+        self._message_type = message_type
+        self._reliable = qos.reliability is Reliability.RELIABLE
         self._queue: deque[Event] = deque(maxlen=depth)
         self._stream: Stream[tuple[Received, Timeline]] = Stream(self._receive, depth)
+        self._lost = 0
         self._overwritten = 0
         self._on_ready: Callable[[], None] = lambda: None
 
     @property
     def dropped(self) -> int:
-        """How many messages were pushed out by newer ones."""
-        return self._overwritten + self._stream.dropped
+        """How many messages were pushed out by newer ones or lost."""
+        return self._overwritten + self._stream.dropped + self._lost
 
     def arrive(self, received: Received) -> None:
         """Accept a message from the transport; callable from any thread."""
@@ -91,17 +100,27 @@ class Reader:
     def answer(self, event: Event, response: object) -> None:
         """Do nothing: what a subscriber's callback returns goes nowhere."""
 
+    def enqueue(self, event: Event) -> None:
+        """Append an event to the queue; called by the event loop."""
+        if len(self._queue) == self._queue.maxlen:
+            self._overwritten += 1
+        self._queue.append(event)
+        self._on_ready()
+
     def _enter(self, received: Received) -> None:
         environment = self._board.environment
         self._stream.put((received, Timeline(environment, environment.now - received.transit_ns)))
 
     def _receive(self, item: tuple[Received, Timeline]) -> Generator[Awaitable, object, None]:
         received, timeline = item
-        yield from self._board.dds.receive(received.size, received.transit_ns, timeline)
-        if len(self._queue) == self._queue.maxlen:
-            self._overwritten += 1
-        self._queue.append(Event(received.message, timeline, received.responder))
-        self._on_ready()
+        if not (
+            yield from self._board.dds.receive(
+                received.size, received.transit_ns, timeline, reliable=self._reliable
+            )
+        ):
+            self._lost += 1
+            return
+        self.enqueue(Event(received.message, timeline, received.responder, self._message_type))
 
 
 class SubscriptionSource(Reader):
@@ -111,7 +130,7 @@ class SubscriptionSource(Reader):
         self, board: Board, node: Node, message_type: MessageType, topic: str, qos: QosProfile | None = None
     ) -> None:
         self._qos = qos or QosProfile()
-        super().__init__(board, self._qos.depth)
+        super().__init__(board, message_type, self._qos)
         self._node = node
         self._type = message_type
         self._topic = topic
@@ -126,11 +145,11 @@ class ServiceSource(Reader):
     """A service server: ready while a request waits."""
 
     def __init__(self, board: Board, node: Node, service_type: ServiceType, name: str) -> None:
-        super().__init__(board, QosProfile().depth)
+        super().__init__(board, service_type.request, QosProfile())
         self._node = node
         self._type = service_type
         self._name = name
-        self._writer = Writer(board, QosProfile().depth)
+        self._writer = Writer(board, QosProfile())
 
     def open(self, on_ready: Callable[[], None], check: Callable[[Any], None] | None) -> None:
         """Serve."""
@@ -196,12 +215,12 @@ class _Outgoing:
 class Writer:
     """Takes messages through the stack and over the link in order, then sends them.
 
-    At most `depth` wait; a further one pushes the oldest out.
+    With KEEP_LAST at most `depth` wait; a further one pushes the oldest out.
     """
 
-    def __init__(self, board: Board, depth: int) -> None:
+    def __init__(self, board: Board, qos: QosProfile) -> None:
         self._board = board
-        self._stream: Stream[_Outgoing] = Stream(self._send, depth)
+        self._stream: Stream[_Outgoing] = Stream(self._send, qos.queue_depth)
 
     @property
     def dropped(self) -> int:
@@ -226,7 +245,7 @@ class TopicWriter:
         self, board: Board, node: Node, message_type: MessageType, topic: str, qos: QosProfile | None = None
     ) -> None:
         qos = qos or QosProfile()
-        self._writer = Writer(board, qos.depth)
+        self._writer = Writer(board, qos)
         self._publisher = node.publisher(message_type, topic, qos)
 
     @property

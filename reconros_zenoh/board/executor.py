@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from reconros_zenoh.board.bitstream import Bitstream, read_bitstreams
 from reconros_zenoh.board.callback import HardwareImplementation
+from reconros_zenoh.board.software import SoftwareImplementation
+from reconros_zenoh.board.timing import hardware_time, software_time
 from reconros_zenoh.board.workers import HardwareWorker, SoftwareWorker
 from reconros_zenoh.errors import UsageError
 from reconros_zenoh.executor.callbacks import CallbackEntry, CallbackKind
@@ -23,8 +25,10 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from reconros_zenoh.board.board import Board
-    from reconros_zenoh.board.callback import HardwareCallback, SoftwareCallback
+    from reconros_zenoh.board.callback import HardwareCallback
     from reconros_zenoh.board.endpoints import Event, Source
+    from reconros_zenoh.board.software import SoftwareCallback
+    from reconros_zenoh.board.timing import ExecutionTime, Timing
     from reconros_zenoh.board.workers import Worker
     from reconros_zenoh.executor.callbacks import Dispatch
 
@@ -38,8 +42,17 @@ class _Registration:
     kind: CallbackKind
     source: Source
     check: Callable[[Any], None] | None
-    software: SoftwareCallback | None = None
-    slots: dict[int, HardwareCallback] = field(default_factory=dict)
+    software: SoftwareImplementation | None = None
+    slots: dict[int, tuple[HardwareCallback, ExecutionTime]] = field(default_factory=dict)
+
+    def timing(self) -> dict[str, object]:
+        """Return what the time of the callback rests on in each place where it may run."""
+        places: dict[str, object] = {}
+        if self.software is not None:
+            places["software"] = self.software.time.describe()
+        for _, time in self.slots.values():
+            places["hardware"] = time.describe()
+        return places
 
 
 class Executor:
@@ -85,11 +98,16 @@ class Executor:
         source: Source,
         function: SoftwareCallback,
         check: Callable[[Any], None] | None = None,
+        timing: Timing | None = None,
     ) -> None:
-        """Let the callback `name` run as a function; `check` raises BadMessageError for bad messages."""
+        """Let the callback `name` run as a function; `check` raises BadMessageError for bad messages.
+
+        How long it takes says `timing`, or without it the table of the profile.
+        """
         if not self._software_workers:
             raise UsageError(f"callback {name!r} runs in software, but there are no software workers.")
-        self._register(name, kind, source, check).software = function
+        time = software_time(self.board.profile, name, timing)
+        self._register(name, kind, source, check).software = SoftwareImplementation(function, time)
 
     def add_hw_callback(
         self,
@@ -99,13 +117,15 @@ class Executor:
         source: Source,
         thread: HardwareCallback,
         check: Callable[[Any], None] | None = None,
+        timing: Timing | None = None,
     ) -> None:
-        """Let the callback `name` run in these slots; `check` as in `add_sw_callback`."""
+        """Let the callback `name` run in these slots; `check` and `timing` as in `add_sw_callback`."""
         served = {slot.slot_id for slot in self._slots}
         for slot in slots:
             if slot not in served:
                 raise UsageError(f"callback {name!r} needs slot {slot}, which no hardware worker serves.")
-            self._register(name, kind, source, check).slots[slot] = thread
+            time = hardware_time(self.board.profile, name, timing, self.board.slots[slot].clock_hz)
+            self._register(name, kind, source, check).slots[slot] = (thread, time)
 
     def spin(self) -> None:
         """Load the bitstreams, open every source and start the workers.
@@ -121,8 +141,8 @@ class Executor:
         board.zycap.init(read_bitstreams(self._bitstreams, wanted.values()) if self._bitstreams else wanted)
         for name, registration in self._registrations.items():
             slots = {
-                slot: HardwareImplementation(board.zycap.bitstream(slot, name), thread)
-                for slot, thread in registration.slots.items()
+                slot: HardwareImplementation(board.zycap.bitstream(slot, name), thread, time)
+                for slot, (thread, time) in registration.slots.items()
             }
             entry = CallbackEntry(
                 name,
@@ -171,6 +191,7 @@ class Executor:
                 "kind": registration.kind.name,
                 "software": registration.software is not None,
                 "slots": sorted(registration.slots),
+                "timing": registration.timing(),
                 "calls": self.calls[name],
                 "failed": self.failures[name],
                 "dropped": registration.source.dropped,
@@ -191,25 +212,9 @@ class Executor:
         model = self.board.profile.model
         return model.executor.dispatch.ns if model else 0
 
-    def software_ns(self, callback: str) -> int | None:
-        """Return the core time [ns] of the callback in software, None where nothing is modelled."""
-        model = self.board.profile.model
-        return model.callbacks[callback].software.ns if model else None
-
-    def compute_ns(self, callback: str) -> int | None:
-        """Return how long [ns] a slot computes for the callback, None where nothing is modelled."""
-        model = self.board.profile.model
-        return model.callbacks[callback].compute.ns if model else None
-
     def _register(
         self, name: str, kind: CallbackKind, source: Source, check: Callable[[Any], None] | None
     ) -> _Registration:
-        model = self.board.profile.model
-        if model and name not in model.callbacks:
-            raise UsageError(
-                f"profile {self.board.profile.name!r} has no times for callback {name!r}. Add a section "
-                f"[model.callbacks.{name}] to a copy of the profile, or use the profile native."
-            )
         registration = self._registrations.setdefault(name, _Registration(kind, source, check))
         if registration.source is not source:
             raise UsageError(f"callback {name!r} is registered already with another source.")

@@ -100,6 +100,15 @@ class Host:
                 self.overruns.count += 1
                 self.overruns.total_ns += self._environment.now - due_ns
 
+    def until(self, due_ns: int) -> Generator[Awaitable, object, None]:
+        """Return when this time has come in the model; if it has passed, that is an overrun."""
+        late_ns = self._environment.now - due_ns
+        if late_ns < 0:
+            yield self._environment.timeout(-late_ns)
+        elif late_ns > 0:
+            self.overruns.count += 1
+            self.overruns.total_ns += late_ns
+
     def compute(self, kernel: Callable[..., R], *arguments: object) -> R:
         """Return `kernel(*arguments)` of a pure kernel; called in the thread of a started computation."""
         if self._pool is not None:
@@ -129,6 +138,12 @@ class Host:
             # In the pool it may have waited for the interpreter or a core: the shortest times tell more.
             slower_ns = (took_ns - expected_ns) / _RUNS_REMEMBERED
             self._expected_ns[task] = min(took_ns, expected_ns + slower_ns)
+
+
+def measured(function: Callable[..., R], *arguments: object) -> tuple[R, int]:
+    """Return `function(*arguments)` and how long it took here [ns]."""
+    started_ns = time.perf_counter_ns()
+    return function(*arguments), time.perf_counter_ns() - started_ns
 
 
 class _Unchanging:

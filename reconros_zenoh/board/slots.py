@@ -15,6 +15,7 @@ class ReconfigurableSlot:
 
     slot_id: int
     bitstream_size: int
+    clock_hz: float
     holds: Bitstream | None = field(default=None, init=False)
     reconfigurations: int = field(default=0, init=False)
     reconfiguration_ns: int = field(default=0, init=False)

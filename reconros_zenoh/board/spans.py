@@ -19,6 +19,7 @@ Stage = Literal[
     "reconfiguration",  # until the slot held its bitstream, waiting for the ICAP included
     "execution",  # computing
     "memif",  # memory transfers of a slot
+    "blocked",  # waiting for a mailbox, mutex, condition or semaphore
     "osif",  # calls of a slot through its delegate thread
     "overrun",  # the host was slower than the modelled time
 ]

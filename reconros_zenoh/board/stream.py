@@ -20,11 +20,13 @@ _log = logging.getLogger(__name__)
 class Stream(Generic[T]):
     """Hands items to a process in order: the next when it is done with the one before.
 
-    At most `depth` wait; a further one pushes the oldest out (KEEP_LAST). `dropped` counts what was pushed
-    out, and the items whose process raised: that is logged, and the stream goes on.
+    At most `depth` wait (None: any number); a further one pushes the oldest out (KEEP_LAST). `dropped` counts
+    what was pushed out, and the items whose process raised: that is logged, and the stream goes on.
     """
 
-    def __init__(self, process: Callable[[T], Generator[Awaitable, object, object]], depth: int) -> None:
+    def __init__(
+        self, process: Callable[[T], Generator[Awaitable, object, object]], depth: int | None
+    ) -> None:
         self._process = process
         self._waiting: deque[T] = deque(maxlen=depth)
         self.dropped = 0

@@ -5,17 +5,20 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from typing import TYPE_CHECKING, cast
 
-from reconros_zenoh.board.callback import HardwareThread, SoftwareContext
+from reconros_zenoh.board.callback import HardwareThread, ThreadExit
+from reconros_zenoh.board.host import measured
+from reconros_zenoh.board.software import SoftwareContext
 from reconros_zenoh.clock.activity import Activity
 from reconros_zenoh.executor.resource_mask import SOFTWARE
 
 if TYPE_CHECKING:
     from collections.abc import Generator
 
-    from reconros_zenoh.board.callback import HardwareImplementation, SoftwareCallback
+    from reconros_zenoh.board.callback import HardwareImplementation
     from reconros_zenoh.board.endpoints import Event
     from reconros_zenoh.board.executor import Executor
     from reconros_zenoh.board.slots import ReconfigurableSlot
+    from reconros_zenoh.board.software import SoftwareImplementation
     from reconros_zenoh.clock.activity import Awaitable
     from reconros_zenoh.executor.callbacks import Dispatch
 
@@ -79,20 +82,37 @@ class SoftwareWorker(Worker):
         board, timeline = self._board, event.timeline
         yield from board.cpu.run(self._executor.dispatch_ns)
         timeline.mark("dispatch")
-        context = SoftwareContext(board.host)
-        callback = cast("SoftwareCallback", dispatch.implementation)
-        future = board.host.start(callback, callback, event.message, context)
-        core_time_ns = self._executor.software_ns(dispatch.entry.name)
-        if core_time_ns is None:
-            response = yield from board.host.result(future)
+        implementation = cast("SoftwareImplementation", dispatch.implementation)
+        context = SoftwareContext(board, dispatch.entry.name, implementation.time)
+        try:
+            response = yield from self._run_function(implementation, event, context)
+        finally:
+            context.release_mutexes()
+        for send in context.sends:
+            send(timeline.fork())
+        return response
+
+    def _run_function(
+        self, implementation: SoftwareImplementation, event: Event, context: SoftwareContext
+    ) -> Generator[Awaitable, object, object]:
+        board, timeline, time = self._board, event.timeline, implementation.time
+        function, host = implementation.function, self._board.host
+        if time.ns is not None:
+            future = host.start(function, function, event.message, context)
+            yield from board.cpu.run(time.ns)
+            timeline.mark("execution")
+            response = yield from host.late_result(future)
+            timeline.mark("overrun")
+        elif not time.modelled:
+            response = yield from host.result(host.start(function, function, event.message, context))
             timeline.mark("execution")
         else:
-            yield from board.cpu.run(core_time_ns)
+            started_ns = self._environment.now
+            future_and_time = host.start(function, measured, function, event.message, context)
+            response, took_ns = yield from host.result(future_and_time)
+            left_ns = round(took_ns * time.factor) - (self._environment.now - started_ns)
+            yield from board.cpu.run(max(0, left_ns))
             timeline.mark("execution")
-            response = yield from board.host.late_result(future)
-            timeline.mark("overrun")
-        for publication in context.publications:
-            publication.writer.send(publication.parts, timeline.fork())
         return response
 
 
@@ -111,21 +131,17 @@ class HardwareWorker(Worker):
         yield from board.zycap.write_bitstream(self._slot, implementation.bitstream)
         timeline.mark("reconfiguration")
         started_ns = self._environment.now
-        thread = HardwareThread(
-            self._environment,
-            event.message,
-            memif=board.memif,
-            osif=board.osif,
-            host=board.host,
-            compute_ns=self._executor.compute_ns(dispatch.entry.name),
-            timeline=timeline,
-        )
+        thread = HardwareThread(board, dispatch.entry.name, self._slot, event, implementation.time)
         try:
-            response = yield from implementation.callback(thread)
+            try:
+                response = yield from implementation.callback(thread)
+            except ThreadExit as end:
+                response = end.response
             if event.responder is not None:
                 # Sending the response is a call through the delegate, as publishing is.
                 yield from board.osif.call()
                 timeline.mark("osif")
             return response
         finally:
+            thread.close()
             self._slot.busy_ns += self._environment.now - started_ns

@@ -2,24 +2,34 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
+import numpy as np
+
+from reconros_zenoh.board.actions import ActionClientSource, ActionSource
+from reconros_zenoh.board.clients import ClientSource
 from reconros_zenoh.board.endpoints import ServiceSource, SubscriptionSource, TimerSource, TopicWriter
 from reconros_zenoh.board.executor import Executor
+from reconros_zenoh.board.os_resources import Condition, Mailbox, Mutex, Semaphore, SharedMemory
+from reconros_zenoh.board.stack_node import StackNode
 from reconros_zenoh.errors import UsageError
 from reconros_zenoh.executor.callbacks import CallbackKind
+from reconros_zenoh.rmw.parameters import Parameters
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
     from reconros_zenoh.board.board import Board
-    from reconros_zenoh.board.callback import HardwareCallback, SoftwareCallback
+    from reconros_zenoh.board.callback import HardwareCallback
     from reconros_zenoh.board.endpoints import Source
+    from reconros_zenoh.board.software import SoftwareCallback
+    from reconros_zenoh.board.timing import Timing
     from reconros_zenoh.project.loader import Project
     from reconros_zenoh.project.mapping_file import Mapping
     from reconros_zenoh.project.resource_groups import Resource
     from reconros_zenoh.rmw.node import Node
+    from reconros_zenoh.ros.qos import QosProfile
     from reconros_zenoh.ros.types import TypeRegistry
 
 
@@ -54,10 +64,17 @@ class Application:
             (resource.group, resource.name): resource for resource in project.configuration.resources
         }
         self._nodes: dict[str, Node] = {}
+        self._made: dict[tuple[str, str], object] = {}
 
-    def source(self, group: str, name: str) -> Source:
-        """Return the end of a topic, service or timer that makes a callback ready."""
+    def source(self, group: str, name: str, qos: QosProfile | None = None) -> Source:
+        """Return the end of a topic, service, action or timer that makes a callback ready.
+
+        `qos` is for a topic: without it reliable, volatile, the last 10. For a client it is what `client` or
+        `action_client` returns.
+        """
         resource = self._resource(group, name)
+        if qos is not None and resource.type != "rossub":
+            raise UsageError(f"resource {name!r} of group {group!r} is a {resource.type}: its QoS is fixed.")
         match resource.type:
             case "rossub":
                 return SubscriptionSource(
@@ -65,6 +82,7 @@ class Application:
                     self._node(resource),
                     self.types.message(_required(resource.interface)),
                     _required(resource.ros_name),
+                    qos,
                 )
             case "rossrvs":
                 return ServiceSource(
@@ -73,23 +91,101 @@ class Application:
                     self.types.service(_required(resource.interface)),
                     _required(resource.ros_name),
                 )
+            case "rossrvc":
+                return self.client(group, name)
+            case "rosactions":
+                return ActionSource(
+                    self.board,
+                    self._node(resource),
+                    self.types.action(_required(resource.interface)),
+                    _required(resource.ros_name),
+                )
+            case "rosactionc":
+                return self.action_client(group, name)
             case "rostmr":
                 return TimerSource(self.board, _required(resource.number) * 1_000_000)
         raise UsageError(
             f"resource {name!r} of group {group!r} is a {resource.type}: it makes no callback ready."
         )
 
-    def writer(self, group: str, name: str) -> TopicWriter:
-        """Return the publisher of that name."""
-        resource = self._resource(group, name)
-        if resource.type != "rospub":
-            raise UsageError(f"resource {name!r} of group {group!r} is a {resource.type}, not a rospub.")
+    def client(self, group: str, name: str) -> ClientSource:
+        """Return the service client of that name, the same one each time."""
+        return self._shared(
+            group,
+            name,
+            "rossrvc",
+            lambda resource: ClientSource(
+                self.board,
+                self._node(resource),
+                self.types.service(_required(resource.interface)),
+                _required(resource.ros_name),
+            ),
+        )
+
+    def action_client(self, group: str, name: str) -> ActionClientSource:
+        """Return the action client of that name, the same one each time."""
+        return self._shared(
+            group,
+            name,
+            "rosactionc",
+            lambda resource: ActionClientSource(
+                self.board,
+                self._node(resource),
+                self.types.action(_required(resource.interface)),
+                _required(resource.ros_name),
+            ),
+        )
+
+    def writer(self, group: str, name: str, qos: QosProfile | None = None) -> TopicWriter:
+        """Return the publisher of that name; without `qos` reliable, volatile, the last 10."""
+        resource = self._resource_of(group, name, "rospub")
         return TopicWriter(
             self.board,
             self._node(resource),
             self.types.message(_required(resource.interface)),
             _required(resource.ros_name),
+            qos,
         )
+
+    def mbox(self, group: str, name: str) -> Mailbox:
+        """Return the mailbox of that name, the same one each time."""
+        return self._shared(
+            group, name, "mbox", lambda r: Mailbox(self.board.environment, _required(r.number))
+        )
+
+    def mutex(self, group: str, name: str) -> Mutex:
+        """Return the mutex of that name, the same one each time."""
+        return self._shared(group, name, "mutex", lambda _: Mutex(self.board.environment))
+
+    def cond(self, group: str, name: str) -> Condition:
+        """Return the condition of that name, the same one each time."""
+        return self._shared(
+            group, name, "cond", lambda r: Condition(self.board.environment, self.mutex(group, r.args[0]))
+        )
+
+    def sem(self, group: str, name: str) -> Semaphore:
+        """Return the semaphore of that name, the same one each time."""
+        return self._shared(
+            group, name, "sem", lambda r: Semaphore(self.board.environment, _required(r.number))
+        )
+
+    def mem(self, group: str, name: str) -> SharedMemory:
+        """Return the memory of that name, the same one each time, zero at first."""
+
+        def allocate(resource: Resource) -> SharedMemory:
+            words = np.zeros(_required(resource.number), np.uint32)
+            return SharedMemory(self.board.memory.map(words.view(np.uint8)), words)
+
+        return self._shared(group, name, "mem", allocate)
+
+    def parameters(self, group: str, name: str) -> Parameters:
+        """Return the parameters of the node (a rosnode) of that name, the same ones each time."""
+
+        def serve(resource: Resource) -> Parameters:
+            node = self._node_named(_required(resource.ros_name))
+            return Parameters(StackNode(self.board, node, node.name), self.types)
+
+        return self._shared(group, name, "rosnode", serve)
 
     def register(
         self,
@@ -99,11 +195,15 @@ class Application:
         software: SoftwareCallback | None = None,
         hardware: HardwareCallback | None = None,
         check: Callable[[Any], None] | None = None,
+        software_timing: Timing | None = None,
+        hardware_timing: Timing | None = None,
+        qos: QosProfile | None = None,
     ) -> None:
         """Let the callback `name` of build.cfg run where the mapping wants it, whenever `resource` is ready.
 
-        That is a subscription, service or timer of its resource groups; `check` raises BadMessageError for
-        bad messages. The executor is the one that the mapping describes; `spin` starts it.
+        That is a subscription, service, action, client or timer of its resource groups; `check` raises
+        BadMessageError for bad messages; the timings say how long it takes where the profile's table does
+        not; `qos` is as in `source`. The executor is the one that the mapping describes; `spin` starts it.
         """
         threads = {thread.name: thread for thread in self.project.configuration.threads}
         if name not in threads:
@@ -117,7 +217,7 @@ class Application:
             raise UsageError(
                 f"callback {name!r} has no resource {resource!r} in its groups, {', '.join(groups)}."
             )
-        source = self.source(group, resource)
+        source = self.source(group, resource, qos)
         kind = _KINDS[self._resources[group, resource].type]
         executor = self._mapped = self._mapped or self._mapped_executor()
         place = self.mapping.callbacks[name]
@@ -127,14 +227,14 @@ class Application:
                     f"callback {name!r} is mapped to software, but no `software` is given. Give it, or "
                     "map the callback to reconfigurable slots."
                 )
-            executor.add_sw_callback(name, kind, source, software, check)
+            executor.add_sw_callback(name, kind, source, software, check, software_timing)
         if place.slots:
             if hardware is None:
                 raise UsageError(
                     f"callback {name!r} is mapped to hardware, but no `hardware` is given. Give it, or "
                     "map the callback to software."
                 )
-            executor.add_hw_callback(name, place.slots, kind, source, hardware, check)
+            executor.add_hw_callback(name, place.slots, kind, source, hardware, check, hardware_timing)
 
     def spin(self, executor: Executor | None = None) -> None:
         """Start the workers of an executor of one's own or of the one that `register` has filled.
@@ -150,6 +250,17 @@ class Application:
         """Take the nodes out of the graph."""
         for node in self._nodes.values():
             node.close()
+
+    def _shared(self, group: str, name: str, kind: str, make: Callable[[Resource], T]) -> T:
+        if (group, name) not in self._made:
+            self._made[group, name] = make(self._resource_of(group, name, kind))
+        return cast("T", self._made[group, name])
+
+    def _resource_of(self, group: str, name: str, kind: str) -> Resource:
+        resource = self._resource(group, name)
+        if resource.type != kind:
+            raise UsageError(f"resource {name!r} of group {group!r} is a {resource.type}, not a {kind}.")
+        return resource
 
     def _mapped_executor(self) -> Executor:
         mapping = self.mapping
@@ -168,7 +279,9 @@ class Application:
             ) from None
 
     def _node(self, resource: Resource) -> Node:
-        name = _required(resource.node)
+        return self._node_named(_required(resource.node))
+
+    def _node_named(self, name: str) -> Node:
         if name not in self._nodes:
             namespace, _, base = name.rpartition("/")
             self._nodes[name] = self.board.context.node(base, namespace or "/")

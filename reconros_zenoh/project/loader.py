@@ -44,13 +44,25 @@ class Project:
 
     @property
     def slots(self) -> tuple[SlotPlan, ...]:
-        """The reconfigurable slots with the resources of their regions."""
+        """The reconfigurable slots with the resources of their regions and their clocks."""
+        clocks = {clock.name: clock.hz for clock in self.configuration.clocks}
         return tuple(
-            SlotPlan(slot.id, resources.lut, resources.dsp, resources.bram36)
+            SlotPlan(
+                slot.id,
+                resources.lut,
+                resources.dsp,
+                resources.bram36,
+                clocks[slot.clock] if slot.clock else None,
+            )
             for slot in self.configuration.slots
             if slot.reconfigurable
             for resources in [slot_resources(slot.regions)]
         )
+
+    @property
+    def pointer_bytes(self) -> int:
+        """The size of a pointer on the board's processor."""
+        return 8 if "64" in self.configuration.cpu_architecture else 4
 
     def start(self, application: Application) -> Executor:
         """Call main(app) and return the executor that it spins.

@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 from reconros_zenoh.errors import BadMessageError, TransportError
 from reconros_zenoh.rmw.endpoint import Endpoint
+from reconros_zenoh.rmw.received import Received
+from reconros_zenoh.ros.attachment import Attachment
 from reconros_zenoh.ros.graph import EndpointKind
 
 if TYPE_CHECKING:
@@ -14,7 +16,7 @@ if TYPE_CHECKING:
     from reconros_zenoh.rmw.node import Node
     from reconros_zenoh.ros.qos import QosProfile
     from reconros_zenoh.ros.types import ServiceType
-    from reconros_zenoh.transport.base import Reply
+    from reconros_zenoh.transport.base import Parts, Reply
 
 
 class Client(Endpoint):
@@ -44,6 +46,19 @@ class Client(Endpoint):
         It gets a TransportError when the server refused or nobody answered within `timeout_ns`, and a
         BadMessageError when the response cannot be decoded.
         """
+
+        def on_received(received: Received | BadMessageError | TransportError) -> None:
+            on_response(received.message if isinstance(received, Received) else received)
+
+        self.call_encoded(self.service_type.request.encode(request), on_received, timeout_ns)
+
+    def call_encoded(
+        self,
+        parts: Parts,
+        on_received: Callable[[Received | BadMessageError | TransportError], None],
+        timeout_ns: int,
+    ) -> None:
+        """Call the service like `call` with a request that is encoded already."""
         answered = False
 
         def on_reply(reply: Reply | None) -> None:
@@ -51,9 +66,8 @@ class Client(Endpoint):
             if answered:
                 return
             answered = True
-            on_response(self._result(reply))
+            on_received(self._result(reply))
 
-        parts = self.service_type.request.encode(request)
         self._querier.get(parts, self.next_attachment(), on_reply, timeout_ns)
 
     def close(self) -> None:
@@ -61,13 +75,16 @@ class Client(Endpoint):
         self.withdraw()
         self._querier.close()
 
-    def _result(self, reply: Reply | None) -> Any | BadMessageError | TransportError:
+    def _result(self, reply: Reply | None) -> Received | BadMessageError | TransportError:
         if reply is None:
             return TransportError(f"no answer from service {self.name}")
         if reply.payload is None:
             return TransportError(f"service {self.name} refused: {reply.error}")
         try:
-            return self.service_type.response.decode(reply.payload)
+            message = self.service_type.response.decode(reply.payload)
+            now_ns = self.context.clock_ns()
+            sent_ns = Attachment.decode(reply.attachment).source_timestamp_ns if reply.attachment else now_ns
         except BadMessageError as error:
             self.context.rejections.add(self.key, None, error)
             return error
+        return Received(message, len(reply.payload), now_ns - sent_ns)

@@ -58,6 +58,11 @@ class QosProfile:
     liveliness: Liveliness = Liveliness.AUTOMATIC
     lease_ns: int = INFINITE_NS
 
+    @property
+    def queue_depth(self) -> int | None:
+        """How many samples a queue holds at most; None with KEEP_ALL."""
+        return self.depth if self.history is History.KEEP_LAST else None
+
     def encode(self) -> str:
         """Return the QoS part of an endpoint token, for example `::,10:,:,:,,`.
 

@@ -53,7 +53,8 @@ class MessageType:
     """A message type that can be sent and received.
 
     `name` is `package/msg/Type`, `dds_name` and `type_hash` are its name and RIHS01 hash on the wire, `cls`
-    is the dataclass of its messages. Comes from a TypeRegistry; may be used from any thread.
+    is the dataclass of its messages, `fields` the names of its fields with their forms (as rosbags has them).
+    Comes from a TypeRegistry; may be used from any thread.
     """
 
     def __init__(self, store: Typestore, name: str) -> None:
@@ -63,12 +64,20 @@ class MessageType:
         self.type_hash = store.hash_rihs01(name)
         self.cls: type[Any] = definition.cls
         self._store = store
+        self._nested: dict[str, MessageType] = {}
         self._deserialize = definition.deserialize_cdr_le
+        self.fields = definition.fields
         self._fields_before = [field for field, _ in definition.fields[:-1]]
         self._last_array = _last_array(definition.fields)
 
     def __repr__(self) -> str:
         return f"MessageType({self.name!r})"
+
+    def nested(self, name: str) -> MessageType:
+        """Return the message type `name` of a field of this one."""
+        if name not in self._nested:
+            self._nested[name] = MessageType(self._store, name)
+        return self._nested[name]
 
     def encode(self, message: Any) -> tuple[bytes | memoryview, ...]:
         """Return the parts that joined are `message` as XCDR1 little endian, with its encapsulation.

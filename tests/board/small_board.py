@@ -21,7 +21,8 @@ if TYPE_CHECKING:
 
     import simpy
 
-    from reconros_zenoh.board.callback import HardwareThread, SoftwareContext
+    from reconros_zenoh.board.callback import HardwareThread
+    from reconros_zenoh.board.software import SoftwareContext
 
     Steps = Generator[Any, Any, Any]
     """What waits for parts of a board with `yield from`."""
@@ -122,12 +123,13 @@ def small_board(
     *,
     environment: VirtualEnvironment | None = None,
     threads: int | None = None,
+    pointer_bytes: int = 4,
 ) -> Board:
     """A board in a network of its own."""
     environment = environment or VirtualEnvironment()
     context = Context(SimulatedNetwork(environment).transport("b0"), 0, environment.clock_ns)
     plans = tuple(SlotPlan(slot, 100, 0, 0) for slot in range(slots))
-    return Board(environment, context, profile, plans, threads=threads)
+    return Board(environment, context, profile, plans, threads=threads, pointer_bytes=pointer_bytes)
 
 
 def desktop(board: Board) -> Context:

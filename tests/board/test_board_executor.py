@@ -60,8 +60,8 @@ def test_a_profile_without_times_for_a_callback() -> None:
     with pytest.raises(UsageError) as caught:
         Executor(board, 1, 0).add_sw_callback("walk", SUB, Tickets(board), ignore)
     assert str(caught.value) == (
-        "profile 'small' has no times for callback 'walk'. Add a section [model.callbacks.walk] to a copy of "
-        "the profile, or use the profile native."
+        "profile 'small' has no times for callback 'walk'. Add the callback with timing=Cycles(n) or "
+        "timing=Native(factor), or add a section [model.callbacks.walk] to a copy of the profile."
     )
 
 
@@ -86,8 +86,27 @@ def test_where_each_callback_may_run() -> None:
     executor.add_sw_callback("a", SUB, source, ignore)
     executor.add_sw_callback("b", CallbackKind.SRV, Tickets(board), ignore)
     assert executor.statistics() == {
-        "a": {"kind": "SUB", "software": True, "slots": [0, 1], "calls": 0, "failed": 0, "dropped": 0},
-        "b": {"kind": "SRV", "software": True, "slots": [], "calls": 0, "failed": 0, "dropped": 0},
+        "a": {
+            "kind": "SUB",
+            "software": True,
+            "slots": [0, 1],
+            "timing": {
+                "software": {"basis": "table", "ms": 0.00001},
+                "hardware": {"basis": "table", "ms": 0.00001},
+            },
+            "calls": 0,
+            "failed": 0,
+            "dropped": 0,
+        },
+        "b": {
+            "kind": "SRV",
+            "software": True,
+            "slots": [],
+            "timing": {"software": {"basis": "table", "ms": 0.00001}},
+            "calls": 0,
+            "failed": 0,
+            "dropped": 0,
+        },
     }
 
 

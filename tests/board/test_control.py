@@ -50,8 +50,24 @@ def test_the_status_of_a_board() -> None:
         "domain": 0,
         "executor": "reconros",
         "callbacks": {
-            "a": {"kind": "SUB", "software": False, "slots": [0], "calls": 2, "failed": 0, "dropped": 0},
-            "b": {"kind": "TMR", "software": True, "slots": [], "calls": 2, "failed": 1, "dropped": 0},
+            "a": {
+                "kind": "SUB",
+                "software": False,
+                "slots": [0],
+                "timing": {"hardware": {"basis": "table", "ms": 2.0}},
+                "calls": 2,
+                "failed": 0,
+                "dropped": 0,
+            },
+            "b": {
+                "kind": "TMR",
+                "software": True,
+                "slots": [],
+                "timing": {"software": {"basis": "table", "ms": 1.0}},
+                "calls": 2,
+                "failed": 1,
+                "dropped": 0,
+            },
         },
         "slots": [
             {"id": 0, "holds": "a", "reconfigurations": 1, "reconfiguration_ms": 0.001, "busy_ms": 4.0},

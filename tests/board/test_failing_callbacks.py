@@ -17,7 +17,8 @@ if TYPE_CHECKING:
     from small_board import Steps
 
     from reconros_zenoh.board.board import Board
-    from reconros_zenoh.board.callback import HardwareThread, SoftwareContext
+    from reconros_zenoh.board.callback import HardwareThread
+    from reconros_zenoh.board.software import SoftwareContext
 
 PROFILE = small_profile({"a": (100, 100)}, osif_ns=7)
 

@@ -21,7 +21,8 @@ if TYPE_CHECKING:
     from small_board import Steps
 
     from reconros_zenoh.board.board import Board
-    from reconros_zenoh.board.callback import HardwareThread, SoftwareContext
+    from reconros_zenoh.board.callback import HardwareThread
+    from reconros_zenoh.board.software import SoftwareContext
     from reconros_zenoh.board.spans import Timeline
 
 

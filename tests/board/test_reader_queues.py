@@ -15,8 +15,8 @@ from reconros_zenoh.executor.callbacks import CallbackKind
 from reconros_zenoh.ros.qos import QosProfile
 
 if TYPE_CHECKING:
-    from reconros_zenoh.board.callback import SoftwareContext
     from reconros_zenoh.board.profile import Profile
+    from reconros_zenoh.board.software import SoftwareContext
 
 
 class Subscriber:
@@ -140,7 +140,7 @@ def test_requests_wait_ten_deep() -> None:
 
 def test_a_writer_sends_in_order_and_pushes_out_the_oldest() -> None:
     board = small_board(small_profile(dds_message_ns=100))
-    writer = Writer(board, depth=2)
+    writer = Writer(board, QosProfile(depth=2))
     log: list[tuple[int, str]] = []
 
     def sent(name: str) -> None:
@@ -156,7 +156,7 @@ def test_a_writer_sends_in_order_and_pushes_out_the_oldest() -> None:
 def test_the_size_of_a_message_is_that_of_all_its_parts() -> None:
     board = small_board(small_profile(dds_byte_ns=1))
     timeline = Timeline(board.environment, 0)
-    Writer(board, depth=1).put((b"head", bytes(100)), timeline, lambda: None)
+    Writer(board, QosProfile(depth=1)).put((b"head", bytes(100)), timeline, lambda: None)
     board.environment.run(until=1000)
     assert timeline.stages_ns["dds"] == 104
 

@@ -15,9 +15,9 @@ from reconros_zenoh.board.executor import Executor
 from reconros_zenoh.executor.callbacks import CallbackKind
 
 if TYPE_CHECKING:
-    from reconros_zenoh.board.callback import SoftwareContext
     from reconros_zenoh.board.executor import ExecutorKind
     from reconros_zenoh.board.profile import Profile
+    from reconros_zenoh.board.software import SoftwareContext
 
 SUB = CallbackKind.SUB
 

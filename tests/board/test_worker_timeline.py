@@ -22,8 +22,9 @@ from reconros_zenoh.transport.simulated import SimulatedNetwork
 if TYPE_CHECKING:
     from small_board import Steps
 
-    from reconros_zenoh.board.callback import HardwareThread, SoftwareContext
+    from reconros_zenoh.board.callback import HardwareThread
     from reconros_zenoh.board.profile import CallbackSection
+    from reconros_zenoh.board.software import SoftwareContext
     from reconros_zenoh.board.spans import Timeline
 
 WORD_OVER_THE_LINK_NS = 270_068  # 0.27 ms and 8 bytes of 8.5 ns

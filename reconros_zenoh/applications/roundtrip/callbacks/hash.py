@@ -12,8 +12,9 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from reconros_zenoh.board.callback import HardwareThread, SoftwareContext
+    from reconros_zenoh.board.callback import HardwareThread
     from reconros_zenoh.board.endpoints import TopicWriter
+    from reconros_zenoh.board.software import SoftwareContext
     from reconros_zenoh.clock.activity import Awaitable
     from reconros_zenoh.ros.types import MessageType
 

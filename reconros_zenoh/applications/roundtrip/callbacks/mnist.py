@@ -12,8 +12,9 @@ from reconros_zenoh.applications.roundtrip.kernels.mnist import SIDE, shipped_cl
 if TYPE_CHECKING:
     from collections.abc import Generator
 
-    from reconros_zenoh.board.callback import HardwareThread, SoftwareContext
+    from reconros_zenoh.board.callback import HardwareThread
     from reconros_zenoh.board.endpoints import TopicWriter
+    from reconros_zenoh.board.software import SoftwareContext
     from reconros_zenoh.clock.activity import Awaitable
 
 

@@ -11,7 +11,8 @@ from reconros_zenoh.errors import BadMessageError
 if TYPE_CHECKING:
     from collections.abc import Generator
 
-    from reconros_zenoh.board.callback import HardwareThread, SoftwareContext
+    from reconros_zenoh.board.callback import HardwareThread
+    from reconros_zenoh.board.software import SoftwareContext
     from reconros_zenoh.clock.activity import Awaitable
     from reconros_zenoh.ros.types import MessageType
 

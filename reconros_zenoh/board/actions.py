@@ -1,0 +1,163 @@
+"""Action servers and clients of a board."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, cast
+
+from reconros_zenoh.board.endpoints import Event
+from reconros_zenoh.board.spans import Timeline
+from reconros_zenoh.board.stack_node import StackNode
+from reconros_zenoh.errors import BadMessageError
+from reconros_zenoh.rmw.action_client import ActionClient
+from reconros_zenoh.rmw.action_server import ActionServer
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from reconros_zenoh.board.board import Board
+    from reconros_zenoh.board.stack_node import Arrived
+    from reconros_zenoh.rmw.action_client import ActionEvent
+    from reconros_zenoh.rmw.action_server import GoalHandle
+    from reconros_zenoh.rmw.node import Node
+    from reconros_zenoh.rmw.received import Received
+    from reconros_zenoh.ros.types import ActionType
+    from reconros_zenoh.transport.base import Parts
+
+_DEPTH = 10
+
+
+class ActionSource:
+    """An action server: ready while an accepted goal waits; the callback gets its `GoalHandle`.
+
+    What the callback returns is the result. When it raises, the goal is aborted. At most 10 goals wait,
+    further ones are not accepted, nor are those that the callback's `check` refuses. A goal that is canceled
+    while it waits is started all the same, with `is_cancel_requested`.
+    """
+
+    def __init__(self, board: Board, node: Node, action_type: ActionType, name: str) -> None:
+        self._board = board
+        self._node = StackNode(board, node, name)
+        self._type = action_type
+        self._name = name
+        self._waiting: deque[Event] = deque()
+        self._check: Callable[[Any], None] | None = None
+        self._on_ready: Callable[[], None] = lambda: None
+        self.dropped = 0
+
+    def open(self, on_ready: Callable[[], None], check: Callable[[Any], None] | None) -> None:
+        """Serve."""
+        self._on_ready = on_ready
+        self._check = check
+        self._server = ActionServer(self._node, self._type, self._name, self._on_goal, self._accept)
+
+    def result(self, **fields: object) -> Any:
+        """Return a result of the action's type with these fields."""
+        return self._type.result.cls(**fields)
+
+    def feedback(self, **fields: object) -> Any:
+        """Return feedback of the action's type with these fields."""
+        return self._type.feedback.cls(**fields)
+
+    def is_ready(self) -> bool:
+        """Tell whether a goal waits."""
+        return bool(self._waiting)
+
+    def take(self) -> Event:
+        """Begin to work on the oldest goal."""
+        event = self._waiting.popleft()
+        event.timeline.mark("queue")
+        self._server.execute(event.message)
+        return event
+
+    def answer(self, event: Event, response: object) -> None:
+        """Send the result to everyone who waits for it."""
+        self._server.finish(event.message, response)
+        self._board.spans.add(event.timeline)
+
+    def _accept(self, goal: Any) -> None:
+        if len(self._waiting) >= _DEPTH:
+            self.dropped += 1
+            raise BadMessageError("goal_queue", f"{_DEPTH} goals wait already")
+        if self._check is not None:
+            self._check(goal)
+
+    def _on_goal(self, handle: GoalHandle, received: Received) -> None:
+        timeline = cast("Arrived", received).timeline
+        self._waiting.append(Event(handle, timeline, _Failure(self._server, handle)))
+        self._on_ready()
+
+
+@dataclass(frozen=True, slots=True)
+class _Failure:
+    """How a goal ends whose callback raised."""
+
+    server: ActionServer
+    handle: GoalHandle
+
+    def respond_encoded(self, parts: Parts) -> None:
+        """Do nothing: the result goes to those who asked for it."""
+
+    def fail(self, text: str) -> None:  # noqa: ARG002 - an aborted goal has no room for the reason
+        self.server.fail(self.handle)
+
+
+class ActionClientSource:
+    """An action client: callbacks send goals with it, and it is ready while an `ActionEvent` waits.
+
+    Of feedback that nobody takes the last 10 are kept; everything else waits however long it takes.
+    """
+
+    def __init__(self, board: Board, node: Node, action_type: ActionType, name: str) -> None:
+        self._board = board
+        self._type = action_type
+        self._waiting: deque[Event] = deque()
+        self._on_ready: Callable[[], None] = lambda: None
+        self._client = ActionClient(StackNode(board, node, name), action_type, name, self._on_event)
+        self.dropped = 0
+
+    def open(self, on_ready: Callable[[], None], check: Callable[[Any], None] | None) -> None:  # noqa: ARG002
+        """Begin to hand out events."""
+        self._on_ready = on_ready
+
+    def goal(self, **fields: object) -> Any:
+        """Return a goal of the action's type with these fields."""
+        return self._type.goal.cls(**fields)
+
+    def new_goal_id(self) -> bytes:
+        """Return the id of a new goal: 16 bytes; callable from any thread."""
+        return self._client.new_goal_id()
+
+    def send_goal(self, goal: object, goal_id: bytes) -> None:
+        """Send a goal; callable from any thread. Raises UsageError when it is not of the action's type."""
+        self._client.send_goal(goal, goal_id)
+
+    def cancel_goal(self, goal_id: bytes) -> None:
+        """Ask for a goal to end early; callable from any thread."""
+        self._client.cancel(goal_id)
+
+    def is_ready(self) -> bool:
+        """Tell whether something has happened."""
+        return bool(self._waiting)
+
+    def take(self) -> Event:
+        """Remove the oldest event and return it."""
+        event = self._waiting.popleft()
+        event.timeline.mark("queue")
+        return event
+
+    def answer(self, event: Event, response: object) -> None:
+        """Do nothing: what the callback returns goes nowhere."""
+
+    def _on_event(self, happened: ActionEvent) -> None:
+        if happened.kind == "feedback":
+            feedback = [
+                place for place, event in enumerate(self._waiting) if event.message.kind == "feedback"
+            ]
+            if len(feedback) >= _DEPTH:
+                del self._waiting[feedback[0]]
+                self.dropped += 1
+        environment = self._board.environment
+        self._waiting.append(Event(happened, Timeline(environment, environment.now)))
+        self._on_ready()

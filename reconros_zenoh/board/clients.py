@@ -1,0 +1,84 @@
+"""Service clients of a board: called by one callback, answered to another."""
+
+from __future__ import annotations
+
+import logging
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+from reconros_zenoh.board.endpoints import Event, Reader, Writer
+from reconros_zenoh.board.spans import Timeline
+from reconros_zenoh.errors import BadMessageError
+from reconros_zenoh.rmw.received import Received
+from reconros_zenoh.ros.qos import QosProfile
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from reconros_zenoh.board.board import Board
+    from reconros_zenoh.errors import TransportError
+    from reconros_zenoh.rmw.node import Node
+    from reconros_zenoh.ros.types import ServiceType
+    from reconros_zenoh.transport.base import Parts
+
+_log = logging.getLogger(__name__)
+_ANSWER_NS = 10_000_000_000
+
+
+class ClientSource(Reader):
+    """A service client: callbacks call with it, and it is ready while a response waits.
+
+    The callback gets each response as its message, and None for a call that the server refused or did not
+    answer within `timeout_ns`, which is logged. Responses come in the order in which they arrive.
+    """
+
+    def __init__(
+        self,
+        board: Board,
+        node: Node,
+        service_type: ServiceType,
+        name: str,
+        timeout_ns: int = _ANSWER_NS,
+    ) -> None:
+        super().__init__(board, service_type.response, QosProfile())
+        self._client = node.client(service_type, name)
+        self._writer = Writer(board, QosProfile())
+        self._timeout_ns = timeout_ns
+        self._check: Callable[[Any], None] | None = None
+        self.unanswered = 0
+
+    def open(self, on_ready: Callable[[], None], check: Callable[[Any], None] | None) -> None:
+        """Begin to hand out responses; one that `check` refuses counts as not answered."""
+        self._on_ready = on_ready
+        self._check = check
+
+    def request(self, **fields: object) -> Any:
+        """Return a request of the service's type with these fields."""
+        return self._client.service_type.request.cls(**fields)
+
+    def encode(self, request: object) -> Parts:
+        """Return the request as it goes over the wire; callable from any thread."""
+        return self._client.service_type.request.encode(request)
+
+    def send(self, parts: Parts, timeline: Timeline) -> None:
+        """Call the service with an encoded request."""
+        call = partial(self._client.call_encoded, parts, self._on_response, self._timeout_ns)
+        self._writer.put(parts, timeline, call)
+
+    def _on_response(self, response: Received | BadMessageError | TransportError) -> None:
+        if isinstance(response, Received):
+            try:
+                if self._check is not None:
+                    self._check(response.message)
+            except BadMessageError as error:
+                self._client.context.rejections.add(self._client.key, None, error)
+                self._board.environment.post(self._give_up, error)
+            else:
+                self.arrive(response)
+        else:
+            self._board.environment.post(self._give_up, response)
+
+    def _give_up(self, reason: BadMessageError | TransportError) -> None:
+        self.unanswered += 1
+        _log.warning("a call of service %s has no answer: %s", self._client.name, reason)
+        self.enqueue(Event(None, Timeline(self._board.environment, self._board.environment.now)))

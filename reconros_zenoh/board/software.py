@@ -1,0 +1,127 @@
+"""What a software callback is written against."""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING, Any, Protocol, TypeAlias, TypeVar
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from reconros_zenoh.board.actions import ActionClientSource
+    from reconros_zenoh.board.board import Board
+    from reconros_zenoh.board.os_resources import Condition, Mailbox, Mutex, Semaphore
+    from reconros_zenoh.board.spans import Timeline
+    from reconros_zenoh.board.timing import ExecutionTime
+    from reconros_zenoh.transport.base import Parts
+
+R = TypeVar("R")
+
+SoftwareCallback: TypeAlias = "Callable[[Any, SoftwareContext], object]"
+"""Called with the message (None for a timer); a service server's callback returns the response."""
+
+
+@dataclass(frozen=True, slots=True)
+class SoftwareImplementation:
+    """What fills the software field of a ResourceMask: the function, and how long it computes."""
+
+    function: SoftwareCallback
+    time: ExecutionTime
+
+
+class Outlet(Protocol):
+    """Where a callback sends messages: a publisher, or a client of a service or action."""
+
+    def encode(self, message: object) -> Parts:
+        """Return the message as it goes over the wire; callable from any thread."""
+
+    def send(self, parts: Parts, timeline: Timeline) -> None:
+        """Send an encoded message."""
+
+
+class SoftwareContext:
+    """What a software callback can do besides computing; it belongs to one call of it, in one thread.
+
+    `log` is the callback's logger.
+    """
+
+    def __init__(self, board: Board, callback: str, time: ExecutionTime) -> None:
+        self._board = board
+        # What is measured is really computed each time.
+        self._really = time.ns is None and time.modelled
+        self._mutexes: dict[Mutex, None] = {}
+        self.sends: list[Callable[[Timeline], object]] = []
+        self.log = logging.getLogger(f"{__name__}.{callback}")
+
+    @property
+    def now_ns(self) -> int:
+        """The present time of the board's clock [ns]: monotonic, in virtual time since the start."""
+        return self._board.environment.clock_ns()
+
+    def compute(self, kernel: Callable[..., R], *arguments: object) -> R:
+        """Return `kernel(*arguments)` of a pure kernel, which need not be computed twice in virtual time."""
+        if self._really:
+            return kernel(*arguments)
+        return self._board.host.compute(kernel, *arguments)
+
+    def publish(self, writer: Outlet, message: object) -> None:
+        """Publish the message once the callback has run to completion."""
+        self.sends.append(partial(writer.send, writer.encode(message)))
+
+    def call(self, client: Outlet, request: object) -> None:
+        """Call the service once the callback has run to completion; its response starts a CLT callback."""
+        self.publish(client, request)
+
+    def send_goal(self, client: ActionClientSource, goal: object) -> bytes:
+        """Send the goal once the callback has run to completion, and return its id.
+
+        What becomes of it starts the callback of the client.
+        """
+        goal_id = client.new_goal_id()
+        self.sends.append(lambda _: client.send_goal(goal, goal_id))
+        return goal_id
+
+    def cancel_goal(self, client: ActionClientSource, goal_id: bytes) -> None:
+        """Ask for a goal to end early, once the callback has run to completion."""
+        self.sends.append(lambda _: client.cancel_goal(goal_id))
+
+    def mbox_tryget(self, mailbox: Mailbox) -> int | None:
+        """Remove the oldest word and return it, or None."""
+        return mailbox.try_get()
+
+    def mbox_tryput(self, mailbox: Mailbox, word: int) -> bool:
+        """Append a word and return True, or return False."""
+        return mailbox.try_put(word)
+
+    def mutex_trylock(self, mutex: Mutex) -> bool:
+        """Hold the mutex, until the callback ends at the latest, and return True; or return False."""
+        self._mutexes[mutex] = None
+        return mutex.try_lock(self)
+
+    def mutex_unlock(self, mutex: Mutex) -> None:
+        """Let others have the mutex."""
+        mutex.unlock(self)
+
+    def cond_signal(self, condition: Condition) -> None:
+        """Let one that waits go on."""
+        condition.signal()
+
+    def cond_broadcast(self, condition: Condition) -> None:
+        """Let all that wait go on."""
+        condition.broadcast()
+
+    def sem_trywait(self, semaphore: Semaphore) -> bool:
+        """Count down and return True, or return False."""
+        return semaphore.try_wait()
+
+    def sem_post(self, semaphore: Semaphore) -> None:
+        """Count up."""
+        semaphore.post()
+
+    def release_mutexes(self) -> None:
+        """Let others have every mutex that is still held: the call has ended, maybe with an error."""
+        for mutex in self._mutexes:
+            if mutex.is_held_by(self):
+                mutex.unlock(self)

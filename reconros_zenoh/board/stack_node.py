@@ -1,0 +1,174 @@
+"""The ends of a node whose messages go through the communication stack of a board."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from reconros_zenoh.board.endpoints import Writer
+from reconros_zenoh.board.spans import Timeline
+from reconros_zenoh.board.stream import Stream
+from reconros_zenoh.rmw.received import Received
+from reconros_zenoh.ros.qos import QosProfile
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Generator
+
+    from reconros_zenoh.board.board import Board
+    from reconros_zenoh.clock.activity import Awaitable
+    from reconros_zenoh.errors import BadMessageError, TransportError
+    from reconros_zenoh.rmw.client import Client
+    from reconros_zenoh.rmw.node import Context, Node
+    from reconros_zenoh.rmw.publisher import Publisher
+    from reconros_zenoh.rmw.received import Responder
+    from reconros_zenoh.ros.types import MessageType, ServiceType
+    from reconros_zenoh.transport.base import Parts
+
+
+class Arrived(NamedTuple):
+    """A message that has come through the stack: a `Received` with its timeline so far."""
+
+    message: Any
+    size: int
+    transit_ns: int
+    responder: Responder | None
+    timeline: Timeline
+
+
+class StackNode:
+    """A node's ends on a board: like those of `Node`, but each message costs what the stack takes.
+
+    Sinks are called by the event loop; what sends may be called from any thread. What is sent is counted in
+    the board's spans under `label`.
+    """
+
+    def __init__(self, board: Board, node: Node, label: str) -> None:
+        self._board = board
+        self._node = node
+        self._label = label
+
+    @property
+    def context(self) -> Context:
+        """The session of the node."""
+        return self._node.context
+
+    def publisher(self, message_type: MessageType, topic: str, qos: QosProfile) -> StackPublisher:
+        """Return a new publisher."""
+        publisher = self._node.publisher(message_type, topic, qos)
+        return StackPublisher(self._board, publisher, qos, self._label)
+
+    def subscription(
+        self, message_type: MessageType, topic: str, sink: Callable[[Arrived], None], qos: QosProfile
+    ) -> None:
+        """Have the messages of a topic handed to `sink`."""
+        arrivals = Arrivals(self._board, sink, qos.depth, self._label)
+        self._node.subscription(message_type, topic, arrivals.accept, qos)
+
+    def service(self, service_type: ServiceType, name: str, sink: Callable[[Arrived], None]) -> None:
+        """Have the requests of a service handed to `sink`."""
+        writer = Writer(self._board, QosProfile())
+
+        def answerable(arrived: Arrived) -> None:
+            assert arrived.responder is not None
+            responder = _StackResponder(self._board, writer, arrived.responder, self._label)
+            sink(arrived._replace(responder=responder))
+
+        arrivals = Arrivals(self._board, answerable, QosProfile().depth, self._label)
+        self._node.service(service_type, name, arrivals.accept)
+
+    def client(self, service_type: ServiceType, name: str) -> StackClient:
+        """Return a new service client."""
+        return StackClient(self._board, self._node.client(service_type, name), self._label)
+
+
+class Arrivals:
+    """Takes messages through the stack in order and hands them to `sink`; KEEP_LAST of `depth`."""
+
+    def __init__(self, board: Board, sink: Callable[[Arrived], None], depth: int, label: str) -> None:
+        self._board = board
+        self._sink = sink
+        self._label = label
+        self._stream: Stream[Arrived] = Stream(self._receive, depth)
+
+    def accept(self, received: Received) -> None:
+        """Accept a message from the transport; callable from any thread."""
+        self._board.environment.post(self._enter, received)
+
+    def _enter(self, received: Received) -> None:
+        environment = self._board.environment
+        timeline = Timeline(environment, environment.now - received.transit_ns)
+        timeline.callback = self._label
+        self._stream.put(Arrived(*received, timeline))
+
+    def _receive(self, arrived: Arrived) -> Generator[Awaitable, object, None]:
+        yield from self._board.dds.receive(arrived.size, arrived.transit_ns, arrived.timeline)
+        self._sink(arrived)
+
+
+class StackPublisher:
+    """A publisher whose messages go through the stack."""
+
+    def __init__(self, board: Board, publisher: Publisher, qos: QosProfile, label: str) -> None:
+        self._board = board
+        self._publisher = publisher
+        self._writer = Writer(board, qos)
+        self._label = label
+
+    def publish(self, message: object) -> None:
+        """Publish the message; raises UsageError when it is not of the topic's type."""
+        parts = self._publisher.message_type.encode(message)
+        send = partial(self._publisher.publish_encoded, parts)
+        self._board.environment.post(_put, self._board, self._writer, parts, send, self._label)
+
+
+class StackClient:
+    """A service client whose requests and responses go through the stack."""
+
+    def __init__(self, board: Board, client: Client, label: str) -> None:
+        self._board = board
+        self._client = client
+        self._writer = Writer(board, QosProfile())
+        self._label = label
+
+    def call(
+        self,
+        request: object,
+        on_response: Callable[[Any | BadMessageError | TransportError], None],
+        timeout_ns: int,
+    ) -> None:
+        """Call the service, as `Client.call`; `on_response` is called by the event loop."""
+        parts = self._client.service_type.request.encode(request)
+        arrivals = Arrivals(self._board, lambda arrived: on_response(arrived.message), 1, self._label)
+
+        def on_received(received: Received | BadMessageError | TransportError) -> None:
+            if isinstance(received, Received):
+                arrivals.accept(received)
+            else:
+                self._board.environment.post(on_response, received)
+
+        send = partial(self._client.call_encoded, parts, on_received, timeout_ns)
+        self._board.environment.post(_put, self._board, self._writer, parts, send, self._label)
+
+
+@dataclass(frozen=True, slots=True)
+class _StackResponder:
+    """Sends a response through the stack."""
+
+    board: Board
+    writer: Writer
+    responder: Responder
+    label: str
+
+    def respond_encoded(self, parts: Parts) -> None:
+        send = partial(self.responder.respond_encoded, parts)
+        self.board.environment.post(_put, self.board, self.writer, parts, send, self.label)
+
+    def fail(self, text: str) -> None:
+        self.responder.fail(text)
+
+
+def _put(board: Board, writer: Writer, parts: Parts, send: Callable[[], None], label: str) -> None:
+    timeline = Timeline(board.environment, board.environment.now)
+    timeline.callback = label
+    writer.put(parts, timeline, send)

@@ -1,0 +1,102 @@
+"""How long a callback takes: from the profile's table, from declared cycles, or from what the host took."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
+
+from reconros_zenoh.errors import UsageError
+
+if TYPE_CHECKING:
+    from reconros_zenoh.board.profile import CallbackSection, Profile
+
+_SECOND_NS = 1_000_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class Cycles:
+    """The callback computes for this many cycles: of the slot's clock in hardware, of a core in software."""
+
+    count: int
+
+    def __post_init__(self) -> None:
+        if self.count < 0:
+            raise UsageError(f"Cycles({self.count}): write 0 or more.")
+
+
+@dataclass(frozen=True, slots=True)
+class Native:
+    """The callback computes for as long as this host took, times `factor`. Repeats differ, as hosts do."""
+
+    factor: float = 1.0
+
+    def __post_init__(self) -> None:
+        if not 0 < self.factor < float("inf"):
+            raise UsageError(f"Native({self.factor}): write a factor above 0.")
+
+
+Timing: TypeAlias = Cycles | Native
+
+
+@dataclass(frozen=True, slots=True)
+class ExecutionTime:
+    """How long one callback computes in one place, and what that rests on.
+
+    `ns` is None where the host is measured: then it takes `factor` times as long as that. Without a model
+    (`modelled` False) it takes as long as it takes.
+    """
+
+    basis: Literal["table", "cycles", "native"]
+    ns: int | None = None
+    factor: float = 1.0
+    modelled: bool = True
+
+    def describe(self) -> dict[str, Any]:
+        """Return the basis and what goes with it, for status and reports."""
+        if self.ns is None:
+            return {"basis": self.basis, "factor": self.factor}
+        return {"basis": self.basis, "ms": self.ns / 1e6}
+
+
+def software_time(profile: Profile, callback: str, timing: Timing | None) -> ExecutionTime:
+    """Return the core time of the callback; raise UsageError when nothing says how long it takes."""
+    if profile.model is None:
+        return _NOT_MODELLED
+    if timing is not None:
+        return _declared(timing, profile.model.cores.clock.hz)
+    return ExecutionTime("table", _table(profile, callback).software.ns)
+
+
+def hardware_time(profile: Profile, callback: str, timing: Timing | None, clock_hz: float) -> ExecutionTime:
+    """Return how long a slot with this clock computes; raise UsageError when nothing says it."""
+    if profile.model is None:
+        return _NOT_MODELLED
+    if timing is not None:
+        return _declared(timing, clock_hz)
+    return ExecutionTime("table", _table(profile, callback).compute.ns)
+
+
+def cycles_ns(count: int, clock_hz: float) -> int:
+    """Return how long so many cycles take [ns]."""
+    return round(count * _SECOND_NS / clock_hz)
+
+
+_NOT_MODELLED = ExecutionTime("native", modelled=False)
+
+
+def _declared(timing: Timing, clock_hz: float) -> ExecutionTime:
+    if isinstance(timing, Cycles):
+        return ExecutionTime("cycles", cycles_ns(timing.count, clock_hz))
+    return ExecutionTime("native", factor=timing.factor)
+
+
+def _table(profile: Profile, callback: str) -> CallbackSection:
+    assert profile.model is not None
+    section = profile.model.callbacks.get(callback)
+    if section is None:
+        raise UsageError(
+            f"profile {profile.name!r} has no times for callback {callback!r}. Add the callback with "
+            f"timing=Cycles(n) or timing=Native(factor), or add a section [model.callbacks.{callback}] to a "
+            "copy of the profile."
+        )
+    return section

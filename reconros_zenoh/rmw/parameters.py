@@ -1,0 +1,204 @@
+"""The parameters of a node and the services through which others see and set them."""
+
+from __future__ import annotations
+
+import threading
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
+
+from reconros_zenoh.errors import UsageError
+from reconros_zenoh.ros.zero_message import zero_message
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from reconros_zenoh.rmw.ends import NodeEnds
+    from reconros_zenoh.rmw.received import Received
+    from reconros_zenoh.ros.types import TypeRegistry
+
+Value: TypeAlias = bool | int | float | str | bytes | list[bool] | list[int] | list[float] | list[str]
+
+# By type: the number and the field of rcl_interfaces/msg/ParameterValue.
+_SCALARS = {
+    bool: (1, "bool_value"),
+    int: (2, "integer_value"),
+    float: (3, "double_value"),
+    str: (4, "string_value"),
+    bytes: (5, "byte_array_value"),
+}
+_LISTS = {
+    bool: (6, "bool_array_value"),
+    int: (7, "integer_array_value"),
+    float: (8, "double_array_value"),
+    str: (9, "string_array_value"),
+}
+_FIELDS = dict((*_SCALARS.values(), *_LISTS.values()))
+
+
+@dataclass(slots=True)
+class _Parameter:
+    value: Value
+    description: str
+    on_set: Callable[[Any], None] | None
+
+
+class Parameters:
+    """The parameters of one node, served under `<node>/get_parameters` and its five sisters.
+
+    A parameter is declared first and keeps its type. Everything may be called from any thread. Deviation:
+    nothing is published on /parameter_events.
+    """
+
+    def __init__(self, node: NodeEnds, types: TypeRegistry) -> None:
+        self._parameters: dict[str, _Parameter] = {}
+        self._lock = threading.Lock()
+        self._value_type = types.message("rcl_interfaces/msg/ParameterValue")
+        self._descriptor_type = types.message("rcl_interfaces/msg/ParameterDescriptor")
+        self._result_type = types.message("rcl_interfaces/msg/SetParametersResult")
+        services: dict[str, Callable[[Any, Any], None]] = {
+            "DescribeParameters": self._describe,
+            "GetParameters": self._get,
+            "GetParameterTypes": self._types,
+            "ListParameters": self._list,
+            "SetParameters": self._set,
+            "SetParametersAtomically": self._set_together,
+        }
+        for name, answer in services.items():
+            service = types.service(f"rcl_interfaces/srv/{name}")
+
+            def respond(received: Received, service: Any = service, answer: Any = answer) -> None:
+                response = zero_message(service.response)
+                answer(received.message, response)
+                assert received.responder is not None
+                received.responder.respond_encoded(service.response.encode(response))
+
+            snake = "".join(f"_{letter.lower()}" if letter.isupper() else letter for letter in name)
+            node.service(service, f"~/{snake[1:]}", respond)
+
+    def declare(
+        self, name: str, value: Value, on_set: Callable[[Any], None] | None = None, description: str = ""
+    ) -> None:
+        """Declare a parameter with its first value.
+
+        `on_set` is called with each new value before it is taken over; its UsageError refuses the value.
+        """
+        _kind(name, value)
+        with self._lock:
+            if name in self._parameters:
+                raise UsageError(f"parameter {name!r} is declared already.")
+            self._parameters[name] = _Parameter(value, description, on_set)
+
+    def get(self, name: str) -> Any:
+        """Return the value of a declared parameter."""
+        return self._declared(name).value
+
+    def set(self, name: str, value: Value) -> None:
+        """Give a declared parameter a new value; raise UsageError when it is refused."""
+        with self._lock:
+            self._check(name, value)
+            self._parameters[name].value = value
+
+    def _check(self, name: str, value: Value) -> None:
+        parameter = self._declared(name)
+        if _kind(name, value) != _kind(name, parameter.value) and value != []:
+            raise UsageError(
+                f"parameter {name!r} is {type(parameter.value).__name__}, not {type(value).__name__}."
+            )
+        if parameter.on_set is not None:
+            parameter.on_set(value)
+
+    def _declared(self, name: str) -> _Parameter:
+        if name not in self._parameters:
+            raise UsageError(f"parameter {name!r} is not declared; there are {', '.join(self._parameters)}.")
+        return self._parameters[name]
+
+    def _message(self, name: str) -> Any:
+        """Return the value as it is sent; that of no parameter says that it is not set."""
+        message = zero_message(self._value_type)
+        if name in self._parameters:
+            value: Any = self._parameters[name].value
+            message.type, field = _kind(name, value)
+            empty = getattr(message, field)
+            if isinstance(empty, np.ndarray):
+                value = np.array(list(value), empty.dtype)
+            setattr(message, field, value)
+        return message
+
+    def _describe(self, request: Any, response: Any) -> None:
+        for name in request.names:
+            descriptor = zero_message(self._descriptor_type)
+            descriptor.name, descriptor.type = name, self._message(name).type
+            if name in self._parameters:
+                descriptor.description = self._parameters[name].description
+            response.descriptors.append(descriptor)
+
+    def _get(self, request: Any, response: Any) -> None:
+        response.values = [self._message(name) for name in request.names]
+
+    def _types(self, request: Any, response: Any) -> None:
+        response.types = np.array([self._message(name).type for name in request.names], np.uint8)
+
+    def _list(self, request: Any, response: Any) -> None:
+        names = [name for name in self._parameters if _is_listed(name, request.prefixes, request.depth)]
+        response.result.names = names
+        parents = dict.fromkeys(name.rpartition(".")[0] for name in names)
+        response.result.prefixes = [parent for parent in parents if parent]
+
+    def _set(self, request: Any, response: Any) -> None:
+        response.results = [self._result([parameter]) for parameter in request.parameters]
+
+    def _set_together(self, request: Any, response: Any) -> None:
+        response.result = self._result(request.parameters)
+
+    def _result(self, parameters: Sequence[Any]) -> Any:
+        """Set all of the parameters or none; return which, and why."""
+        result = zero_message(self._result_type)
+        with self._lock:
+            try:
+                values = {parameter.name: _value(parameter) for parameter in parameters}
+                for name, value in values.items():
+                    self._check(name, value)
+            except UsageError as error:
+                result.reason = str(error)
+                return result
+            for name, value in values.items():
+                self._parameters[name].value = value
+        result.successful = True
+        return result
+
+
+def _value(parameter: Any) -> Any:
+    """Return the value in an rcl_interfaces/msg/Parameter."""
+    if parameter.value.type not in _FIELDS:
+        raise UsageError(f"parameter {parameter.name!r} cannot be unset.")
+    field = _FIELDS[parameter.value.type]
+    value = getattr(parameter.value, field)
+    if field == "byte_array_value":
+        return bytes(value)
+    return value.tolist() if isinstance(value, np.ndarray) else value
+
+
+def _kind(name: str, value: Value) -> tuple[int, str]:
+    """Return number and field of the value's type; raise UsageError for what no parameter can be."""
+    if isinstance(value, list):
+        kinds = {type(element) for element in value} or {str}
+        if len(kinds) == 1 and (kind := kinds.pop()) in _LISTS:
+            return _LISTS[kind]
+    elif type(value) in _SCALARS:
+        return _SCALARS[type(value)]
+    raise UsageError(
+        f"parameter {name!r} cannot be {value!r}: give a bool, int, float, str, bytes or a list."
+    )
+
+
+def _is_listed(name: str, prefixes: Sequence[str], depth: int) -> bool:
+    """Tell whether the name is asked for: below these prefixes, so many levels deep (0: all)."""
+    for prefix in prefixes or [""]:
+        if prefix and not f"{name}.".startswith(f"{prefix}."):
+            continue
+        below = name[len(prefix) :].strip(".")
+        if not depth or below.count(".") < depth:
+            return True
+    return False

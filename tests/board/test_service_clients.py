@@ -1,0 +1,138 @@
+"""Service clients on a board: called by one callback, answered to another."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import pytest
+from small_board import Tickets, desktop, small_board, small_profile, types
+
+from reconros_zenoh.board.clients import ClientSource
+from reconros_zenoh.board.executor import Executor
+from reconros_zenoh.errors import BadMessageError
+from reconros_zenoh.executor.callbacks import CallbackKind
+
+if TYPE_CHECKING:
+    from small_board import Steps
+
+    from reconros_zenoh.board.callback import HardwareThread
+    from reconros_zenoh.board.software import SoftwareContext
+
+SET_BOOL = types().service("std_srvs/srv/SetBool")
+PROFILE = small_profile({"ask": (100, 100), "hear": (50, 50)}, link_ns=1000, osif_ns=7)
+SECOND_NS = 10**9
+
+
+class Asking:
+    """A board whose callback `ask` calls the service and whose callback `hear` gets the responses."""
+
+    def __init__(self, *, hardware: bool = False, serve: bool = True, check: Any = None) -> None:
+        self.board = small_board(PROFILE, 2)
+        self.client = ClientSource(self.board, self.board.context.node("client"), SET_BOOL, "set", SECOND_NS)
+        self.executor = Executor(self.board, 1, 2)
+        self.tickets = Tickets(self.board)
+        self.heard: list[tuple[int, Any]] = []
+        if hardware:
+            self.executor.add_hw_callback("ask", [0], CallbackKind.SUB, self.tickets, self.ask_in_hardware)
+            self.executor.add_hw_callback(
+                "hear", [1], CallbackKind.CLT, self.client, self.hear_in_hardware, check
+            )
+        else:
+            self.executor.add_sw_callback("ask", CallbackKind.SUB, self.tickets, self.ask)
+            self.executor.add_sw_callback("hear", CallbackKind.CLT, self.client, self.hear, check)
+        self.executor.spin()
+        self.requests: list[Any] = []
+        if serve:
+            desktop(self.board).node("server").service(SET_BOOL, "set", self.serve)
+
+    def ask(self, ticket: Any, context: SoftwareContext) -> None:
+        context.call(self.client, self.client.request(data=bool(ticket)))
+
+    def hear(self, response: Any, context: SoftwareContext) -> None:
+        self.heard.append((context.now_ns, response))
+
+    def ask_in_hardware(self, thread: HardwareThread) -> Steps:
+        ticket = yield from thread.get_init_data()
+        yield from thread.call(self.client, self.client.request(data=bool(ticket)))
+
+    def hear_in_hardware(self, thread: HardwareThread) -> Steps:
+        response = yield from thread.get_init_data()
+        self.heard.append((self.board.environment.now, response))
+
+    def serve(self, received: Any) -> None:
+        self.requests.append(received.message.data)
+        answer = SET_BOOL.response.cls(success=received.message.data, message="")
+        received.responder.respond_encoded(SET_BOOL.response.encode(answer))
+
+    def run(self, *tickets: Any) -> None:
+        for ticket in tickets:
+            self.tickets.put(ticket)
+        self.board.environment.run(until=2 * SECOND_NS)
+
+
+@pytest.mark.parametrize("hardware", [False, True])
+def test_each_response_starts_the_clients_callback(hardware: bool) -> None:
+    case = Asking(hardware=hardware)
+    case.run(1, 0)
+    assert case.requests == [True, False]
+    assert [response.success for _, response in case.heard] == [True, False]
+    statistics = case.executor.statistics()["hear"]
+    assert (statistics["kind"], statistics["calls"], statistics["failed"]) == ("CLT", 2, 0)
+
+
+def test_request_and_response_go_over_the_link_and_through_the_stack() -> None:
+    case = Asking()
+    case.run(1)
+    # 100 ns of the caller, 1000 ns each way; the other callback's function runs when its 50 ns begin.
+    assert case.heard[0][0] == 100 + 2 * 1000
+
+
+@pytest.mark.parametrize("hardware", [False, True])
+def test_a_call_without_an_answer_is_told_as_none(hardware: bool, caplog: pytest.LogCaptureFixture) -> None:
+    case = Asking(hardware=hardware, serve=False)
+    case.run(1)
+    assert [response for _, response in case.heard] == [None]
+    assert case.client.unanswered == 1
+    assert "a call of service /set has no answer: no answer from service /set" in caplog.text
+
+
+def test_a_server_that_says_nothing_is_given_up_in_time(caplog: pytest.LogCaptureFixture) -> None:
+    case = Asking(serve=False)
+    held: list[Any] = []
+    desktop(case.board).node("server").service(SET_BOOL, "set", held.append)
+    case.run(1)
+    assert [response for _, response in case.heard] == [None]
+    assert case.heard[0][0] == 100 + 1000 + SECOND_NS
+
+
+def test_a_refused_call(caplog: pytest.LogCaptureFixture) -> None:
+    case = Asking(serve=False)
+    desktop(case.board).node("server").service(
+        SET_BOOL, "set", lambda received: received.responder.fail("no time")
+    )
+    case.run(1)
+    assert [response for _, response in case.heard] == [None]
+    assert "service /set refused: no time" in caplog.text
+
+
+def test_a_response_that_the_callback_cannot_use(caplog: pytest.LogCaptureFixture) -> None:
+    def check(response: Any) -> None:
+        if not response.success:
+            raise BadMessageError("success", "it says no")
+
+    case = Asking(check=check)
+    case.run(0, 1)
+    assert [getattr(response, "success", None) for _, response in case.heard] == [None, True]
+    assert case.board.context.rejections.counts() == {"success": 1}
+
+
+def test_a_request_of_a_wrong_type_fails_the_caller(caplog: pytest.LogCaptureFixture) -> None:
+    case = Asking()
+    case.ask = lambda _, context: context.call(case.client, 5)  # type: ignore[method-assign]
+    executor, tickets = Executor(case.board, 1, 0), Tickets(case.board)
+    executor.add_sw_callback("ask", CallbackKind.SUB, tickets, case.ask)
+    executor.spin()
+    tickets.put(1)
+    case.run()
+    assert executor.failures == {"ask": 1}
+    assert not case.requests

@@ -1,0 +1,146 @@
+"""The parameters of a node over its services, as `ros2 param` uses them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from two_sessions import TwoSessions, types
+
+from reconros_zenoh.errors import UsageError
+from reconros_zenoh.rmw.parameters import Parameters
+
+VALUES: dict[str, Any] = {
+    "flag": True,
+    "count": 3,
+    "gain.x": 0.5,
+    "gain.inner.y": 1.5,
+    "name": "left",
+    "raw": b"\1\2",
+    "flags": [True, False],
+    "counts": [1, 2],
+    "gains": [0.5],
+    "names": ["a", "b"],
+}
+KINDS = [1, 2, 3, 3, 4, 5, 6, 7, 8, 9]
+
+
+class Remote:
+    """A node /arm/motor with parameters here, and clients of its services there."""
+
+    def __init__(self) -> None:
+        self.sessions = TwoSessions()
+        self.parameters = Parameters(self.sessions.here.node("motor", "/arm"), types())
+        self._client = self.sessions.there.node("remote")
+
+    def ask(self, service: str, **fields: Any) -> Any:
+        snake = "".join(f"_{letter.lower()}" if letter.isupper() else letter for letter in service)[1:]
+        service_type = types().service(f"rcl_interfaces/srv/{service}")
+        answers: list[Any] = []
+        request = service_type.request.cls(**fields)
+        self._client.client(service_type, f"/arm/motor/{snake}").call(request, answers.append, 10**9)
+        self.sessions.settle()
+        (answer,) = answers
+        return answer
+
+    def set(self, service: str, **values: Any) -> Any:
+        parameter = types().message("rcl_interfaces/msg/Parameter")
+        scratch = Parameters(TwoSessions().here.node("scratch"), types())
+        for name, value in values.items():
+            scratch.declare(name, value)
+        made = [parameter.cls(name=name, value=scratch._message(name)) for name in values]
+        return self.ask(service, parameters=made)
+
+
+@pytest.fixture
+def remote() -> Remote:
+    remote = Remote()
+    for name, value in VALUES.items():
+        remote.parameters.declare(name, value, description=f"the {name}")
+    return remote
+
+
+def test_values_and_their_types(remote: Remote) -> None:
+    names = [*VALUES, "nothing"]
+    values = remote.ask("GetParameters", names=names).values
+    assert [value.type for value in values] == [*KINDS, 0]
+    assert values[0].bool_value is True
+    assert values[1].integer_value == 3
+    assert values[4].string_value == "left"
+    assert values[5].byte_array_value.tolist() == [1, 2]
+    assert values[6].bool_array_value.tolist() == [True, False]
+    assert values[9].string_array_value == ["a", "b"]
+    assert remote.ask("GetParameterTypes", names=names).types.tolist() == [*KINDS, 0]
+    described = remote.ask("DescribeParameters", names=names).descriptors
+    assert [(d.name, d.type, d.description) for d in described[:1]] == [("flag", 1, "the flag")]
+
+
+@pytest.mark.parametrize(
+    ("prefixes", "depth", "names"),
+    [
+        ([], 0, list(VALUES)),
+        ([], 1, [name for name in VALUES if "." not in name]),
+        (["gain"], 0, ["gain.x", "gain.inner.y"]),
+        (["gain"], 1, ["gain.x"]),
+        (["gain.inner", "flag"], 0, ["flag", "gain.inner.y"]),
+        (["gai"], 0, []),
+    ],
+)
+def test_the_list(remote: Remote, prefixes: list[str], depth: int, names: list[str]) -> None:
+    result = remote.ask("ListParameters", prefixes=prefixes, depth=depth).result
+    assert result.names == names
+    assert set(result.prefixes) == {name.rpartition(".")[0] for name in names if "." in name}
+
+
+def test_setting(remote: Remote) -> None:
+    results = remote.set("SetParameters", count=7, flag=5, unknown=1).results
+    assert [result.successful for result in results] == [True, False, False]
+    assert "'flag' is bool, not int" in results[1].reason
+    assert "'unknown' is not declared" in results[2].reason
+    assert (remote.parameters.get("count"), remote.parameters.get("flag")) == (7, True)
+    for name, value in VALUES.items():
+        if "." not in name:
+            assert remote.set("SetParameters", **{name: value}).results[0].successful
+            assert remote.parameters.get(name) == value
+
+
+def test_setting_all_or_none(remote: Remote) -> None:
+    assert not remote.set("SetParametersAtomically", count=7, flag=5).result.successful
+    assert remote.parameters.get("count") == 3
+    assert remote.set("SetParametersAtomically", count=7, flag=False).result.successful
+    assert (remote.parameters.get("count"), remote.parameters.get("flag")) == (7, False)
+
+
+def test_a_callback_may_refuse_a_value() -> None:
+    remote = Remote()
+    told: list[int] = []
+
+    def on_set(value: int) -> None:
+        told.append(value)
+        if value < 0:
+            raise UsageError("not below 0")
+
+    remote.parameters.declare("count", 1, on_set)
+    results = [remote.set("SetParameters", count=value).results[0] for value in (-1, 2)]
+    assert [(result.successful, result.reason) for result in results] == [(False, "not below 0"), (True, "")]
+    assert (told, remote.parameters.get("count")) == ([-1, 2], 2)
+    with pytest.raises(UsageError, match="not below 0"):
+        remote.parameters.set("count", -5)
+
+
+def test_what_cannot_be_unset(remote: Remote) -> None:
+    parameter = types().message("rcl_interfaces/msg/Parameter").cls
+    unset = parameter(name="count", value=remote.parameters._message("nothing"))
+    assert not remote.ask("SetParameters", parameters=[unset]).results[0].successful
+
+
+@pytest.mark.parametrize("value", [None, [1, "a"], {}, np.float32(1), [None]])
+def test_what_no_parameter_can_be(value: Any) -> None:
+    with pytest.raises(UsageError, match="cannot be"):
+        Remote().parameters.declare("x", value)
+
+
+def test_declared_twice(remote: Remote) -> None:
+    with pytest.raises(UsageError, match="declared already"):
+        remote.parameters.declare("flag", False)
