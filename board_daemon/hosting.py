@@ -30,6 +30,7 @@ class BoardOptions:
     domain: int = 0
     seed: int = 0
     bitstreams: Path | None = None
+    tap: bool = False
 
 
 class HostedBoard:
@@ -57,6 +58,7 @@ class HostedBoard:
             name=options.name,
             seed=options.seed,
             threads=threads,
+            tap=options.tap,
         )
         self._application = Application(project, self.board, mapping, project.types(), options.bitstreams)
         project.main(self._application)

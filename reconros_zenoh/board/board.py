@@ -8,12 +8,14 @@ from typing import TYPE_CHECKING
 
 from reconros_zenoh.board.cpu import Cpu
 from reconros_zenoh.board.dds import DdsStack
+from reconros_zenoh.board.hmt import HardwareTopic
 from reconros_zenoh.board.host import Host
 from reconros_zenoh.board.memif import Memif
 from reconros_zenoh.board.osif import Osif
 from reconros_zenoh.board.slots import ReconfigurableSlot
 from reconros_zenoh.board.spans import Spans
 from reconros_zenoh.board.zycap import ZyCAP
+from reconros_zenoh.errors import UsageError
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -21,6 +23,7 @@ if TYPE_CHECKING:
     from reconros_zenoh.board.profile import Profile
     from reconros_zenoh.clock.virtual import VirtualEnvironment
     from reconros_zenoh.rmw.node import Context
+    from reconros_zenoh.ros.types import MessageType
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,8 +53,12 @@ class Board:
         name: str = "board0",
         seed: int = 0,
         threads: int | None = None,
+        tap: bool = False,
     ) -> None:
-        """`threads` run the computations in wall time; None: they run in line, in virtual time."""
+        """`threads` run the computations in wall time; None: they run in line, in virtual time.
+
+        `tap` lets what passes its hardware-mapped topics out into the network, for debugging.
+        """
         model = profile.model
         self.environment = environment
         self.context = context
@@ -65,12 +72,28 @@ class Board:
         self.dds = DdsStack(environment, self.cpu, model, self.randomness)
         self.host = Host(environment, threads)
         self.spans = Spans()
+        self.hardware_topics: dict[str, HardwareTopic] = {}
+        self._tap = tap
         self.slots: Mapping[int, ReconfigurableSlot] = {
             plan.slot_id: ReconfigurableSlot(
                 plan.slot_id, profile.bitstream_size(plan.lut, plan.dsp, plan.bram36)
             )
             for plan in slots
         }
+
+    def hardware_topic(self, name: str, message_type: MessageType) -> HardwareTopic:
+        """Return the hardware-mapped topic of that absolute name, the same one each time.
+
+        Raise UsageError when it has another type.
+        """
+        topic = self.hardware_topics.get(name)
+        if topic is None:
+            topic = self.hardware_topics[name] = HardwareTopic(self, name, message_type)
+            if self._tap:
+                topic.open_tap()
+        if topic.type.name != message_type.name:
+            raise UsageError(f"{topic.key} has the type {topic.type.name}, not {message_type.name}.")
+        return topic
 
     def close(self) -> None:
         """Let running computations end; the board does nothing any more."""

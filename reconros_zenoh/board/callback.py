@@ -12,14 +12,12 @@ if TYPE_CHECKING:
     import numpy as np
 
     from reconros_zenoh.board.bitstream import Bitstream
-    from reconros_zenoh.board.endpoints import TopicWriter
+    from reconros_zenoh.board.endpoints import Event, MessageWriter
     from reconros_zenoh.board.host import Host
     from reconros_zenoh.board.memif import Memif
     from reconros_zenoh.board.osif import Osif
-    from reconros_zenoh.board.spans import Timeline
     from reconros_zenoh.clock.activity import Awaitable
     from reconros_zenoh.clock.virtual import VirtualEnvironment
-    from reconros_zenoh.transport.base import Parts
 
 R = TypeVar("R")
 
@@ -40,10 +38,10 @@ class HardwareImplementation:
 
 @dataclass(frozen=True, slots=True)
 class Publication:
-    """A message that a callback published, encoded."""
+    """A message that a callback published, as `MessageWriter.encode` returned it."""
 
-    writer: TopicWriter
-    parts: Parts
+    writer: MessageWriter
+    encoded: Any
 
 
 class SoftwareContext:
@@ -57,7 +55,7 @@ class SoftwareContext:
         """Return `kernel(*arguments)` of a pure kernel, which need not be computed twice in virtual time."""
         return self._host.compute(kernel, *arguments)
 
-    def publish(self, writer: TopicWriter, message: object) -> None:
+    def publish(self, writer: MessageWriter, message: object) -> None:
         """Publish the message once the callback has run to completion."""
         self.publications.append(Publication(writer, writer.encode(message)))
 
@@ -73,38 +71,47 @@ class HardwareThread:
     def __init__(
         self,
         environment: VirtualEnvironment,
-        message: object,
+        event: Event,
         *,
         memif: Memif,
         osif: Osif,
         host: Host,
         compute_ns: int | None,
-        timeline: Timeline,
     ) -> None:
         self._environment = environment
-        self._message = message
+        self._event = event
         self._memif = memif
         self._osif = osif
         self._host = host
         self._compute_ns = compute_ns
-        self._timeline = timeline
+        self._timeline = event.timeline
 
     def get_init_data(self) -> Generator[Awaitable, object, Any]:
         """Return the message that the callback was started with: THREAD_GETINITDATA."""
         yield from self._osif.call()
         self._timeline.mark("osif")
-        return self._message
+        return self._event.message
 
     def mem_read(self, data: np.ndarray[Any, Any]) -> Generator[Awaitable, object, np.ndarray[Any, Any]]:
-        """Return the array once it has come from main memory into the slot: MEM_READ."""
-        yield from self._memif.transfer(data.nbytes)
-        self._timeline.mark("memif")
+        """Return the array once it has come from main memory into the slot: MEM_READ.
+
+        What came over a hardware-mapped topic is in the slot already.
+        """
+        if not self._event.in_slot:
+            yield from self._memif.transfer(data.nbytes)
+            self._timeline.mark("memif")
         return data
 
-    def mem_write(self, data: np.ndarray[Any, Any]) -> Generator[Awaitable, object, None]:
-        """Return when the array has gone from the slot to main memory: MEM_WRITE."""
-        yield from self._memif.transfer(data.nbytes)
-        self._timeline.mark("memif")
+    def mem_write(
+        self, data: np.ndarray[Any, Any], to: MessageWriter | None = None
+    ) -> Generator[Awaitable, object, None]:
+        """Return when the array has gone from the slot to main memory: MEM_WRITE.
+
+        `to` is the writer that will publish it: for a hardware-mapped topic it stays in the slot.
+        """
+        if to is None or not to.in_slot:
+            yield from self._memif.transfer(data.nbytes)
+            self._timeline.mark("memif")
 
     def compute(self, kernel: Callable[..., R], *arguments: object) -> Generator[Awaitable, object, R]:
         """Return `kernel(*arguments)` of a pure kernel when the slot has computed it."""
@@ -119,8 +126,6 @@ class HardwareThread:
         self._timeline.mark("overrun")
         return result
 
-    def publish(self, writer: TopicWriter, message: object) -> Generator[Awaitable, object, None]:
-        """Publish the message through the delegate: ROS_PUBLISHER_PUBLISH."""
-        yield from self._osif.call()
-        self._timeline.mark("osif")
-        writer.send(writer.encode(message), self._timeline.fork())
+    def publish(self, writer: MessageWriter, message: object) -> Generator[Awaitable, object, None]:
+        """Publish the message as its topic is mapped: through the delegate, or onto a stream."""
+        yield from writer.publish(message, self._osif, self._timeline)

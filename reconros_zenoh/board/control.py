@@ -84,6 +84,10 @@ def status(board: Board, executor: Executor) -> dict[str, Any]:
             }
             for slot in board.slots.values()
         ],
+        "hmt": {
+            topic.key: {"passed": topic.passed, "dropped": topic.dropped, "waits": topic.waits}
+            for topic in board.hardware_topics.values()
+        },
         "spans_ms": board.spans.mean_ms(),
         "rejected": dict(board.context.rejections.counts()),
         "host": {

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     import simpy
 
     from reconros_zenoh.board.board import Board
+    from reconros_zenoh.board.osif import Osif
     from reconros_zenoh.clock.activity import Awaitable
     from reconros_zenoh.rmw.node import Node
     from reconros_zenoh.rmw.received import Received, Responder
@@ -26,11 +27,15 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """What a worker takes: the message of the callback (None for a timer) and its timeline so far."""
+    """What a worker takes: the message of the callback (None for a timer) and its timeline so far.
+
+    `in_slot`: it came over a hardware-mapped topic, so a slot need not read it from main memory.
+    """
 
     message: Any
     timeline: Timeline
     responder: Responder | None = None
+    in_slot: bool = False
 
 
 class Source(Protocol):
@@ -54,6 +59,26 @@ class Source(Protocol):
 
     def answer(self, event: Event, response: object) -> None:
         """Pass on what the callback returned."""
+
+
+class MessageWriter(Protocol):
+    """What callbacks publish with, wherever the topic is mapped to."""
+
+    @property
+    def in_slot(self) -> bool:
+        """Whether messages leave the slot without passing main memory."""
+
+    def message(self, **fields: object) -> Any:
+        """Return a message of the topic's type with these fields."""
+
+    def encode(self, message: object) -> Any:
+        """Return what `send` takes; callable from any thread."""
+
+    def send(self, encoded: Any, timeline: Timeline) -> None:
+        """Publish what `encode` returned: the way of a software callback."""
+
+    def publish(self, message: object, osif: Osif, timeline: Timeline) -> Generator[Awaitable, object, None]:
+        """Publish the message: the way of a hardware thread, which goes on when this returns."""
 
 
 class Reader:
@@ -222,6 +247,8 @@ class Writer:
 class TopicWriter:
     """A publisher of the board."""
 
+    in_slot = False
+
     def __init__(
         self, board: Board, node: Node, message_type: MessageType, topic: str, qos: QosProfile | None = None
     ) -> None:
@@ -242,6 +269,12 @@ class TopicWriter:
         """Return the message as it goes over the wire; callable from any thread."""
         return self._publisher.message_type.encode(message)
 
-    def send(self, parts: Parts, timeline: Timeline) -> None:
+    def send(self, encoded: Parts, timeline: Timeline) -> None:
         """Publish an encoded message."""
-        self._writer.put(parts, timeline, partial(self._publisher.publish_encoded, parts))
+        self._writer.put(encoded, timeline, partial(self._publisher.publish_encoded, encoded))
+
+    def publish(self, message: object, osif: Osif, timeline: Timeline) -> Generator[Awaitable, object, None]:
+        """Publish the message through the delegate: ROS_PUBLISHER_PUBLISH."""
+        yield from osif.call()
+        timeline.mark("osif")
+        self.send(self.encode(message), timeline.fork())

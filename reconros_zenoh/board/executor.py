@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from reconros_zenoh.board.bitstream import Bitstream, read_bitstreams
 from reconros_zenoh.board.callback import HardwareImplementation
+from reconros_zenoh.board.hmt import HmtSource
 from reconros_zenoh.board.workers import HardwareWorker, SoftwareWorker
 from reconros_zenoh.errors import UsageError
 from reconros_zenoh.executor.callbacks import CallbackEntry, CallbackKind
@@ -87,6 +88,8 @@ class Executor:
         check: Callable[[Any], None] | None = None,
     ) -> None:
         """Let the callback `name` run as a function; `check` raises BadMessageError for bad messages."""
+        if isinstance(source, HmtSource):
+            raise UsageError(f"callback {name!r} reads a hardware-mapped topic: it cannot run in software.")
         if not self._software_workers:
             raise UsageError(f"callback {name!r} runs in software, but there are no software workers.")
         self._register(name, kind, source, check).software = function

@@ -108,6 +108,36 @@ class MemifSection(_Section):
     bandwidth: Bandwidth
 
 
+class TopicsSection(_Section):
+    """Software-mapped topics between nodes of one board.
+
+    A publication takes `publish`, and for a software publisher `copy_in` per byte. It then wakes the hardware
+    readers one after another: `notify_hardware` each until they start, of which `notify_software` holds a
+    software publisher and with it the software readers up. A software reader copies what a software publisher
+    wrote at `copy_out` per hardware reader, because they read at the same time, and what a hardware publisher
+    wrote at the speed of the MEMIF.
+    """
+
+    publish: Duration
+    notify_hardware: Duration
+    notify_software: Duration
+    copy_in: CostPerByte
+    copy_out: CostPerByte
+
+
+class GatewaySection(_Section):
+    """A gateway core: what it takes to `cancel` its request to the delegate, before it can publish."""
+
+    cancel: Duration
+
+
+class HmtSection(_Section):
+    """The streams of hardware-mapped topics: `overhead` is what a subscriber needs to take a message over."""
+
+    overhead: Duration
+    bandwidth: Bandwidth
+
+
 class OsifSection(_Section):
     """The operating system interface: one call through the delegate thread."""
 
@@ -152,6 +182,9 @@ class Model(_Section):
     osif: OsifSection
     bitstreams: Annotated[tuple[BitstreamSection, ...], Field(min_length=1)]
     callbacks: dict[str, CallbackSection]
+    topics: TopicsSection | None = None
+    gateway: GatewaySection | None = None
+    hmt: HmtSection | None = None
 
 
 class Profile(_Section):

@@ -19,6 +19,7 @@ Stage = Literal[
     "reconfiguration",  # until the slot held its bitstream, waiting for the ICAP included
     "execution",  # computing
     "memif",  # memory transfers of a slot
+    "hmt",  # on the stream of a hardware-mapped topic, waiting for room included
     "osif",  # calls of a slot through its delegate thread
     "overrun",  # the host was slower than the modelled time
 ]

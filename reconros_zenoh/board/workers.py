@@ -92,7 +92,7 @@ class SoftwareWorker(Worker):
             response = yield from board.host.late_result(future)
             timeline.mark("overrun")
         for publication in context.publications:
-            publication.writer.send(publication.parts, timeline.fork())
+            publication.writer.send(publication.encoded, timeline.fork())
         return response
 
 
@@ -113,12 +113,11 @@ class HardwareWorker(Worker):
         started_ns = self._environment.now
         thread = HardwareThread(
             self._environment,
-            event.message,
+            event,
             memif=board.memif,
             osif=board.osif,
             host=board.host,
             compute_ns=self._executor.compute_ns(dispatch.entry.name),
-            timeline=timeline,
         )
         try:
             response = yield from implementation.callback(thread)

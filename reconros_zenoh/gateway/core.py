@@ -1,7 +1,7 @@
 """The state machine of the gateway core (Gateways, Section 3, Fig. 4).
 
-The core is a node in hardware. Its one delegate thread either blocks until the software-mapped topic (SMT) has
-a message or does something else for the core, never both: to publish, the core has to cancel its request
+The core is a node in hardware. Its one delegate thread either blocks until the software-mapped topic (SMT)
+has a message or does something else for the core, never both: to publish, the core has to cancel its request
 first. A message that came to the delegate between request and cancel comes back with the cancel, and is
 forwarded like any other.
 

@@ -5,14 +5,17 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, TypeVar
 
 from reconros_zenoh.board.endpoints import ServiceSource, SubscriptionSource, TimerSource, TopicWriter
+from reconros_zenoh.board.hmt import HmtSource, HmtWriter
 from reconros_zenoh.errors import UsageError
+from reconros_zenoh.project.communication import topic_name
 
 if TYPE_CHECKING:
     from pathlib import Path
 
     from reconros_zenoh.board.board import Board
-    from reconros_zenoh.board.endpoints import Source
+    from reconros_zenoh.board.endpoints import MessageWriter, Source
     from reconros_zenoh.board.executor import Executor
+    from reconros_zenoh.board.hmt import HardwareTopic
     from reconros_zenoh.project.loader import Project
     from reconros_zenoh.project.mapping_file import Mapping
     from reconros_zenoh.project.resource_groups import Resource
@@ -47,6 +50,8 @@ class Application:
         """Return the end of a topic, service or timer that makes a callback ready."""
         resource = self._resource(group, name)
         match resource.type:
+            case "rossub" if resource.hardware_mapped:
+                return HmtSource(self.board, self._hardware_topic(resource), resource.fifo)
             case "rossub":
                 return SubscriptionSource(
                     self.board,
@@ -67,11 +72,13 @@ class Application:
             f"resource {name!r} of group {group!r} is a {resource.type}: it makes no callback ready."
         )
 
-    def writer(self, group: str, name: str) -> TopicWriter:
+    def writer(self, group: str, name: str) -> MessageWriter:
         """Return the publisher of that name."""
         resource = self._resource(group, name)
         if resource.type != "rospub":
             raise UsageError(f"resource {name!r} of group {group!r} is a {resource.type}, not a rospub.")
+        if resource.hardware_mapped:
+            return HmtWriter(self._hardware_topic(resource))
         return TopicWriter(
             self.board,
             self._node(resource),
@@ -98,6 +105,11 @@ class Application:
                 f"{self.project.configuration.path} has no resource {name!r} in a group {group!r}. "
                 f"It has {known}."
             ) from None
+
+    def _hardware_topic(self, resource: Resource) -> HardwareTopic:
+        return self.board.hardware_topic(
+            topic_name(resource), self.types.message(_required(resource.interface))
+        )
 
     def _node(self, resource: Resource) -> Node:
         name = _required(resource.node)

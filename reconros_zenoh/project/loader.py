@@ -11,6 +11,7 @@ from reconros_zenoh.board.bitstream import Bitstream
 from reconros_zenoh.board.board import SlotPlan
 from reconros_zenoh.errors import FileError, UsageError
 from reconros_zenoh.project.build_cfg import read_build_cfg
+from reconros_zenoh.project.communication import check_places, check_topics
 from reconros_zenoh.project.interfaces import read_interfaces
 from reconros_zenoh.project.mapping_file import read_mapping
 from reconros_zenoh.project.resources import slot_resources
@@ -64,9 +65,11 @@ class Project:
 
     def mapping(self, name_or_file: str) -> Mapping:
         """Return the mapping of that name in the project's folder `mappings`, or the one in that file."""
-        return read_mapping(
+        mapping = read_mapping(
             self.mapping_path(name_or_file), self.callbacks, [slot.slot_id for slot in self.slots]
         )
+        check_places(self.configuration, mapping.callbacks)
+        return mapping
 
     def mapping_path(self, name_or_file: str) -> Path:
         """Return where the mapping stands; raise UsageError when there is none of that name."""
@@ -95,6 +98,7 @@ class Project:
 def load_project(folder: Path) -> Project:
     """Return the project in a folder; raise FileError for what is missing or wrong in it."""
     configuration = read_build_cfg(folder / "build.cfg")
+    check_topics(configuration)
     interfaces = read_interfaces(folder)
     path = folder / "main.py"
     if not path.is_file():

@@ -56,8 +56,14 @@ def small_profile(
     link_byte_ns: float = 0,
     icap_offset_ns: int = 0,
     osif_ns: int = 0,
+    hmt_overhead_ns: int = 0,
+    cancel_ns: int = 0,
+    topics: Mapping[str, float] | None = None,
 ) -> Profile:
-    """`callbacks` gives each name its time in software and what its slot computes; the MEMIF moves 1 B/ns."""
+    """`callbacks` gives each name its time in software and what its slot computes; the MEMIF moves 1 B/ns.
+
+    A hardware-mapped topic moves 1 B/ns, too. `topics` are the constants of topics inside the board.
+    """
 
     def of(value: float, unit: str) -> dict[str, object]:
         return {"value": value, "unit": unit, "basis": "assumed"}
@@ -95,6 +101,13 @@ def small_profile(
             for name, (software_ns, compute_ns) in (callbacks or {}).items()
         },
     }
+    model["hmt"] = {"overhead": of(hmt_overhead_ns, "ns"), "bandwidth": of(1, "GB/s")}
+    model["gateway"] = {"cancel": of(cancel_ns, "ns")}
+    if topics is not None:
+        model["topics"] = {
+            name: of(topics.get(name, 0), "ns/B" if name.startswith("copy") else "ns")
+            for name in ("publish", "notify_hardware", "notify_software", "copy_in", "copy_out")
+        }
     return Profile.model_validate({"name": "small", "description": "", "model": model})
 
 

@@ -13,14 +13,14 @@ if TYPE_CHECKING:
     from collections.abc import Generator
 
     from reconros_zenoh.board.callback import HardwareThread, SoftwareContext
-    from reconros_zenoh.board.endpoints import TopicWriter
+    from reconros_zenoh.board.endpoints import MessageWriter
     from reconros_zenoh.clock.activity import Awaitable
 
 
 class Inverse:
     """Subscribes to std_msgs/UInt32, publishes std_msgs/UInt32."""
 
-    def __init__(self, publisher: TopicWriter) -> None:
+    def __init__(self, publisher: MessageWriter) -> None:
         self._publisher = publisher
 
     def check(self, message: Any) -> None:
@@ -39,5 +39,5 @@ class Inverse:
         message = yield from thread.get_init_data()
         ram = yield from thread.mem_read(np.array([message.data], np.uint32))
         word = yield from thread.compute(inverse_kinematics, int(ram[0]))
-        yield from thread.mem_write(np.array([word], np.uint32))
+        yield from thread.mem_write(np.array([word], np.uint32), to=self._publisher)
         yield from thread.publish(self._publisher, self._publisher.message(data=word))
