@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING
 
 from reconros_zenoh.board.cpu import Cpu
 from reconros_zenoh.board.dds import DdsStack
+from reconros_zenoh.board.endpoints import TopicWriter
 from reconros_zenoh.board.hmt import HardwareTopic
 from reconros_zenoh.board.host import Host
+from reconros_zenoh.board.local_topics import LocalTopics, LocalTopicWriter
 from reconros_zenoh.board.memif import Memif
 from reconros_zenoh.board.osif import Osif
 from reconros_zenoh.board.slots import ReconfigurableSlot
@@ -22,7 +24,7 @@ if TYPE_CHECKING:
 
     from reconros_zenoh.board.profile import Profile
     from reconros_zenoh.clock.virtual import VirtualEnvironment
-    from reconros_zenoh.rmw.node import Context
+    from reconros_zenoh.rmw.node import Context, Node
     from reconros_zenoh.ros.types import MessageType
 
 
@@ -72,6 +74,7 @@ class Board:
         self.dds = DdsStack(environment, self.cpu, model, self.randomness)
         self.host = Host(environment, threads)
         self.spans = Spans()
+        self.topics = LocalTopics(self, model, model.topics) if model and model.topics else None
         self.hardware_topics: dict[str, HardwareTopic] = {}
         self._tap = tap
         self.slots: Mapping[int, ReconfigurableSlot] = {
@@ -80,6 +83,14 @@ class Board:
             )
             for plan in slots
         }
+
+    def writer(
+        self, node: Node, message_type: MessageType, topic: str, *, in_place: bool = False
+    ) -> TopicWriter:
+        """Return a new publisher on a software-mapped topic; `in_place` as in `LocalTopics.publish`."""
+        if self.topics is None:
+            return TopicWriter(self, node, message_type, topic)
+        return LocalTopicWriter(self, node, message_type, topic, self.topics, in_place=in_place)
 
     def hardware_topic(self, name: str, message_type: MessageType) -> HardwareTopic:
         """Return the hardware-mapped topic of that absolute name, the same one each time.
@@ -97,5 +108,7 @@ class Board:
 
     def close(self) -> None:
         """Let running computations end; the board does nothing any more."""
+        if self.topics is not None:
+            self.topics.close()
         self.zycap.deinit()
         self.host.close()

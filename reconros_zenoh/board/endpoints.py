@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 from reconros_zenoh.board.spans import Timeline
 from reconros_zenoh.board.stream import Stream
+from reconros_zenoh.errors import BadMessageError
 from reconros_zenoh.ros.qos import QosProfile
 
 if TYPE_CHECKING:
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from reconros_zenoh.board.board import Board
     from reconros_zenoh.board.osif import Osif
     from reconros_zenoh.clock.activity import Awaitable
+    from reconros_zenoh.gateway.filters import PublisherFilter
     from reconros_zenoh.rmw.node import Node
     from reconros_zenoh.rmw.received import Received, Responder
     from reconros_zenoh.ros.types import MessageType, ServiceType
@@ -81,6 +83,14 @@ class MessageWriter(Protocol):
         """Publish the message: the way of a hardware thread, which goes on when this returns."""
 
 
+class _Incoming(NamedTuple):
+    """A message and what it has to go through to its reader's queue."""
+
+    received: Received
+    timeline: Timeline
+    way: Generator[Awaitable, object, None]
+
+
 class Reader:
     """The queue of messages behind the communication stack: base of subscriptions and service servers.
 
@@ -90,7 +100,7 @@ class Reader:
     def __init__(self, board: Board, depth: int) -> None:
         self._board = board
         self._queue: deque[Event] = deque(maxlen=depth)
-        self._stream: Stream[tuple[Received, Timeline]] = Stream(self._receive, depth)
+        self._stream: Stream[_Incoming] = Stream(self._receive, depth)
         self._overwritten = 0
         self._on_ready: Callable[[], None] = lambda: None
 
@@ -118,11 +128,13 @@ class Reader:
 
     def _enter(self, received: Received) -> None:
         environment = self._board.environment
-        self._stream.put((received, Timeline(environment, environment.now - received.transit_ns)))
+        timeline = Timeline(environment, environment.now - received.transit_ns)
+        way = self._board.dds.receive(received.size, received.transit_ns, timeline)
+        self._stream.put(_Incoming(received, timeline, way))
 
-    def _receive(self, item: tuple[Received, Timeline]) -> Generator[Awaitable, object, None]:
-        received, timeline = item
-        yield from self._board.dds.receive(received.size, received.transit_ns, timeline)
+    def _receive(self, incoming: _Incoming) -> Generator[Awaitable, object, None]:
+        received, timeline, way = incoming
+        yield from way
         if len(self._queue) == self._queue.maxlen:
             self._overwritten += 1
         self._queue.append(Event(received.message, timeline, received.responder))
@@ -130,13 +142,27 @@ class Reader:
 
 
 class SubscriptionSource(Reader):
-    """A subscription: ready while a message waits."""
+    """A subscription: ready while a message waits.
+
+    It discards what `own` does not let pass. `in_hardware` says that its callback runs in slots.
+    """
 
     def __init__(
-        self, board: Board, node: Node, message_type: MessageType, topic: str, qos: QosProfile | None = None
+        self,
+        board: Board,
+        node: Node,
+        message_type: MessageType,
+        topic: str,
+        qos: QosProfile | None = None,
+        *,
+        own: PublisherFilter | None = None,
+        in_hardware: bool = False,
     ) -> None:
         self._qos = qos or QosProfile()
         super().__init__(board, self._qos.depth)
+        self.in_hardware = in_hardware
+        self._own = own
+        self._check: Callable[[Any], None] | None = None
         self._node = node
         self._type = message_type
         self._topic = topic
@@ -144,7 +170,35 @@ class SubscriptionSource(Reader):
     def open(self, on_ready: Callable[[], None], check: Callable[[Any], None] | None) -> None:
         """Subscribe."""
         self._on_ready = on_ready
-        self._node.subscription(self._type, self._topic, self.arrive, self._qos, check)
+        self._check = check
+        subscription = self._node.subscription(self._type, self._topic, self.arrive, self._qos, check)
+        if self._board.topics is not None:
+            self._board.topics.add_reader(subscription.key, self)
+
+    def arrive(self, received: Received) -> None:
+        """Accept a message from the transport; callable from any thread."""
+        topics = self._board.topics
+        # What this board publishes comes back from the network, too, where somebody else reads it.
+        known = topics is not None and received.publisher in topics.publishers
+        if not known and self._admits(received.publisher):
+            super().arrive(received)
+
+    def deliver(
+        self, received: Received, timeline: Timeline, way: Generator[Awaitable, object, None]
+    ) -> None:
+        """Accept a message from this board once it has gone its way."""
+        if not self._admits(received.publisher):
+            return
+        try:
+            if self._check is not None:
+                self._check(received.message)
+        except BadMessageError as error:
+            self._board.context.rejections.add(self._topic, received.publisher.hex(), error)
+            return
+        self._stream.put(_Incoming(received, timeline, way))
+
+    def _admits(self, publisher: bytes) -> bool:
+        return self._own is None or self._own.passes(publisher)
 
 
 class ServiceSource(Reader):
@@ -255,6 +309,8 @@ class TopicWriter:
         qos = qos or QosProfile()
         self._writer = Writer(board, qos.depth)
         self._publisher = node.publisher(message_type, topic, qos)
+        self.key = self._publisher.key
+        self.gid = self._publisher.gid
 
     @property
     def dropped(self) -> int:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, TypeVar
 
-from reconros_zenoh.board.endpoints import ServiceSource, SubscriptionSource, TimerSource, TopicWriter
+from reconros_zenoh.board.endpoints import ServiceSource, SubscriptionSource, TimerSource
 from reconros_zenoh.board.hmt import HmtSource, HmtWriter
 from reconros_zenoh.errors import UsageError
 from reconros_zenoh.project.communication import topic_name
@@ -58,6 +58,7 @@ class Application:
                     self._node(resource),
                     self.types.message(_required(resource.interface)),
                     _required(resource.ros_name),
+                    in_hardware=self._in_hardware(resource),
                 )
             case "rossrvs":
                 return ServiceSource(
@@ -79,8 +80,7 @@ class Application:
             raise UsageError(f"resource {name!r} of group {group!r} is a {resource.type}, not a rospub.")
         if resource.hardware_mapped:
             return HmtWriter(self._hardware_topic(resource))
-        return TopicWriter(
-            self.board,
+        return self.board.writer(
             self._node(resource),
             self.types.message(_required(resource.interface)),
             _required(resource.ros_name),
@@ -105,6 +105,14 @@ class Application:
                 f"{self.project.configuration.path} has no resource {name!r} in a group {group!r}. "
                 f"It has {known}."
             ) from None
+
+    def _in_hardware(self, resource: Resource) -> bool:
+        """Tell whether a callback that uses the resource may run in a slot."""
+        return any(
+            self.mapping.callbacks[thread.name].slots
+            for thread in self.project.configuration.threads
+            if resource.group in thread.resource_groups
+        )
 
     def _hardware_topic(self, resource: Resource) -> HardwareTopic:
         return self.board.hardware_topic(
