@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from reconros_zenoh.board.cpu import Cpu
 from reconros_zenoh.board.dds import DdsStack
 from reconros_zenoh.board.endpoints import TopicWriter
+from reconros_zenoh.board.gateway import Gateway
 from reconros_zenoh.board.hmt import HardwareTopic
 from reconros_zenoh.board.host import Host
 from reconros_zenoh.board.local_topics import LocalTopics, LocalTopicWriter
@@ -18,6 +19,7 @@ from reconros_zenoh.board.slots import ReconfigurableSlot
 from reconros_zenoh.board.spans import Spans
 from reconros_zenoh.board.zycap import ZyCAP
 from reconros_zenoh.errors import UsageError
+from reconros_zenoh.gateway.filters import Pair, conflict
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -76,6 +78,7 @@ class Board:
         self.spans = Spans()
         self.topics = LocalTopics(self, model, model.topics) if model and model.topics else None
         self.hardware_topics: dict[str, HardwareTopic] = {}
+        self.gateways: list[Gateway] = []
         self._tap = tap
         self.slots: Mapping[int, ReconfigurableSlot] = {
             plan.slot_id: ReconfigurableSlot(
@@ -106,8 +109,25 @@ class Board:
             raise UsageError(f"{topic.key} has the type {topic.type.name}, not {message_type.name}.")
         return topic
 
+    def add_gateway(self, name: str, hmt: str, smt: str, message_type: MessageType) -> Gateway:
+        """Return a new gateway between the topics of these absolute names.
+
+        Raise UsageError when one of them has a gateway already, or another type.
+        """
+        topic = self.hardware_topic(hmt, message_type)
+        taken = conflict(Pair(topic.key, smt), [gateway.pair for gateway in self.gateways])
+        if taken is not None:
+            raise UsageError(
+                f"{taken} has a gateway on board {self.name!r} already: two would send messages round."
+            )
+        gateway = Gateway(self, self.context.node(name), topic, smt)
+        self.gateways.append(gateway)
+        return gateway
+
     def close(self) -> None:
         """Let running computations end; the board does nothing any more."""
+        for gateway in self.gateways:
+            gateway.close()
         if self.topics is not None:
             self.topics.close()
         self.zycap.deinit()

@@ -47,8 +47,10 @@ class Publication:
 class SoftwareContext:
     """What a software callback can do besides computing; it belongs to one call of it, in one thread."""
 
-    def __init__(self, host: Host) -> None:
+    def __init__(self, host: Host, started_ns: int) -> None:
+        """`started_ns` is the time on the board's clock at which the callback is started."""
         self._host = host
+        self.started_ns = started_ns
         self.publications: list[Publication] = []
 
     def compute(self, kernel: Callable[..., R], *arguments: object) -> R:

@@ -309,6 +309,7 @@ class TopicWriter:
         qos = qos or QosProfile()
         self._writer = Writer(board, qos.depth)
         self._publisher = node.publisher(message_type, topic, qos)
+        self.topic = self._publisher.name
         self.key = self._publisher.key
         self.gid = self._publisher.gid
 

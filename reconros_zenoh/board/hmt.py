@@ -52,6 +52,7 @@ class Streamed(NamedTuple):
     publisher: Hashable
     message: Any
     size: int
+    targets: list[Fifo]
     timeline: Timeline
     complete: Signal
 
@@ -79,30 +80,43 @@ class Fifo:
         self.messages: deque[Streamed] = deque()
         self.held = 0
         self.room = Signal()
+        self.is_open = True
 
     @property
     def is_full(self) -> bool:
         """Whether every place is taken, by messages on their way included."""
-        return self.held >= self.plan.depth
+        return self.is_open and self.held >= self.plan.depth
 
-    def admits(self, publisher: Hashable) -> bool:
-        """Tell whether this publisher's message comes here; count it when it is lost for want of room."""
-        if self.own is not None and not self.own.passes(publisher):
+    @property
+    def blocks(self) -> bool:
+        """Whether publishers have to wait for room here."""
+        return self.is_full and self.plan.policy == "block"
+
+    def reserve(self) -> bool:
+        """Take a place for a message, or count that it is lost here for want of one."""
+        if self.is_full:
+            self.dropped += 1
             return False
-        lost = self.is_full and self.plan.policy == "drop"
-        self.dropped += lost
-        return not lost
+        self.held += 1
+        return True
 
     def append(self, streamed: Streamed) -> None:
         """Put a message, whose place is taken already, where its reader finds it."""
-        self.messages.append(streamed)
-        self.on_ready()
+        if self.is_open:
+            self.messages.append(streamed)
+            self.on_ready()
 
     def take(self) -> Streamed:
         """Remove the oldest message and return it; its place is free."""
         streamed = self.messages.popleft()
         self.release()
         return streamed
+
+    def close(self) -> None:
+        """Let nobody wait for room."""
+        self.is_open = False
+        self.held += 1
+        self.release()
 
     def release(self) -> None:
         """Free a place."""
@@ -114,9 +128,11 @@ class Fifo:
 class HardwareTopic:
     """A stream that any number of hardware nodes write to and read from.
 
-    One message passes at a time, in the order in which they were published, to all subscribers at once. It
-    takes its size through the stream's bandwidth; bodies are handed over by reference. `overhead_ns` is what
-    a subscribing slot needs to take a message over.
+    One message passes at a time, to all subscribers at once, in the order in which publishers found room: one
+    that has to wait does not keep another from passing, or a gateway that is about to write could not go on
+    to read. A publisher publishes one message at a time. A message takes its size through the stream's
+    bandwidth; bodies are handed over by reference. `overhead_ns` is what a subscribing slot needs to take a
+    message over.
     """
 
     def __init__(self, board: Board, topic: str, message_type: MessageType) -> None:
@@ -147,6 +163,15 @@ class HardwareTopic:
         """Let every message that passes from now on reach this FIFO."""
         self._fifos.append(fifo)
 
+    def unsubscribe(self, fifo: Fifo) -> None:
+        """Let nothing reach this FIFO any more; a stream that waits for its room goes on."""
+        self._fifos.remove(fifo)
+        fifo.close()
+
+    def size(self, message: Any) -> int:
+        """Return how many bytes the message has on a stream: as many as on the wire."""
+        return sum(map(len, self.type.encode(message)))
+
     def open_tap(self) -> None:
         """Publish what passes on the topic's key; without any cost in the model."""
         publisher = self._board.context.transport.publish(self.key, QosProfile())
@@ -169,7 +194,13 @@ class HardwareTopic:
                     f"a message of {size} bytes on {self.key} does not fit a FIFO that is declared for "
                     f"{fifo.plan.message_bytes}. Raise the bytes in build.cfg."
                 )
-        streamed = Streamed(publisher, message, size, timeline, Signal())
+        fifos = [fifo for fifo in self._fifos if fifo.own is None or fifo.own.passes(publisher)]
+        self.waits += any(fifo.blocks for fifo in fifos)
+        while full := next((fifo for fifo in fifos if fifo.blocks), None):
+            yield full.room
+        # All places at once: who held one while waiting for another could keep a third from going on.
+        targets = [fifo for fifo in fifos if fifo.reserve()]
+        streamed = Streamed(publisher, message, size, targets, timeline, Signal())
         self._passages.put(streamed)
         if streamed.complete.callbacks is not None:
             yield streamed.complete
@@ -177,21 +208,14 @@ class HardwareTopic:
             self._tap.put(parts)
 
     def _pass(self, streamed: Streamed) -> Generator[Awaitable, object, None]:
-        targets = [fifo for fifo in self._fifos if fifo.admits(streamed.publisher)]
-        for fifo in targets:
-            if fifo.is_full:
-                self.waits += 1
-                while fifo.is_full:
-                    yield fifo.room
-            fifo.held += 1
         self.passed += 1
-        for fifo in targets:
+        for fifo in streamed.targets:
             if fifo.cut_through:
                 fifo.append(streamed)
         duration_ns = round(streamed.size * self._ns_per_byte)
         if duration_ns:
             yield self._board.environment.timeout(duration_ns)
-        for fifo in targets:
+        for fifo in streamed.targets:
             if not fifo.cut_through:
                 self._hand_over(fifo, streamed)
         streamed.complete.fire()

@@ -79,7 +79,7 @@ class SoftwareWorker(Worker):
         board, timeline = self._board, event.timeline
         yield from board.cpu.run(self._executor.dispatch_ns)
         timeline.mark("dispatch")
-        context = SoftwareContext(board.host)
+        context = SoftwareContext(board.host, self._environment.now)
         callback = cast("SoftwareCallback", dispatch.implementation)
         future = board.host.start(callback, callback, event.message, context)
         core_time_ns = self._executor.software_ns(dispatch.entry.name)

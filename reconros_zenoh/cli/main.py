@@ -24,6 +24,7 @@ _VERBS = {
     "board": ("daemons", "board"),
     "client": ("daemons", "client"),
     "status": ("daemons", "status"),
+    "gateway": ("gateway", "gateway"),
     "build": ("build", "build"),
 }
 """Each verb with its module in this package and its name there, in the order of `reconros --help`."""

@@ -8,6 +8,7 @@ from reconros_zenoh.board.endpoints import ServiceSource, SubscriptionSource, Ti
 from reconros_zenoh.board.hmt import HmtSource, HmtWriter
 from reconros_zenoh.errors import UsageError
 from reconros_zenoh.project.communication import topic_name
+from reconros_zenoh.ros.names import resolve
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -87,7 +88,14 @@ class Application:
         )
 
     def spin(self, executor: Executor) -> None:
-        """Start the executor's workers; it is the one that the board reports on."""
+        """Start the gateways and the executor's workers; it is the one that the board reports on."""
+        for gateway in self.project.configuration.gateways:
+            self.board.add_gateway(
+                gateway.name,
+                resolve(gateway.hw_topic, "/", gateway.name),
+                resolve(gateway.sw_topic, "/", gateway.name),
+                self.types.message(gateway.type),
+            )
         self.executor = executor
         executor.spin()
 

@@ -66,6 +66,15 @@ def check_places(configuration: BuildConfiguration, callbacks: Mapping[str, Call
                     f"{_ENDS[resource.type]} of a hardware-mapped topic.",
                     "Map the callback to slots only, or the topic to software, with a gateway between.",
                 )
+    for gateway in configuration.gateways:
+        for name, callback in callbacks.items():
+            if set(gateway.slots) & set(callback.slots):
+                raise FileError(
+                    configuration.path,
+                    gateway.line,
+                    f"The gateway {gateway.name} sits in a slot that the callback {name} is mapped to.",
+                    "Give the gateway a slot of its own.",
+                )
 
 
 def _check_ends(configuration: BuildConfiguration, topic: str, ends: list[Resource]) -> None:

@@ -131,12 +131,17 @@ def small_board(
     *,
     environment: VirtualEnvironment | None = None,
     threads: int | None = None,
+    network: SimulatedNetwork | None = None,
+    name: str = "board0",
 ) -> Board:
-    """A board in a network of its own."""
-    environment = environment or VirtualEnvironment()
-    context = Context(SimulatedNetwork(environment).transport("b0"), 0, environment.clock_ns)
+    """A board in a network of its own, or in this one."""
+    if network is None:
+        network = SimulatedNetwork(environment or VirtualEnvironment())
+    environment = network.environment
+    session = f"b{name.removeprefix('board')}"
+    context = Context(network.transport(session), 0, environment.clock_ns)
     plans = tuple(SlotPlan(slot, 100, 0, 0) for slot in range(slots))
-    return Board(environment, context, profile, plans, threads=threads)
+    return Board(environment, context, profile, plans, threads=threads, name=name)
 
 
 def desktop(board: Board) -> Context:
