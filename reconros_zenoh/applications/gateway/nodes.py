@@ -1,8 +1,8 @@
 """The nodes of Fig. 5: one publishes images of random data, the others copy them and check what they got.
 
 The same kernels run on a software-mapped topic, a hardware-mapped one, and with a gateway between. An image
-carries the time of its publication as its stamp, and publisher, number and CRC-32 as its frame id. Source: Gateways,
-Section 4.
+carries the time of its publication as its stamp, and publisher, number and CRC-32 as its frame id.
+Source: Gateways, Section 4.
 """
 
 from __future__ import annotations
