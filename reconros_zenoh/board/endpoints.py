@@ -31,13 +31,15 @@ if TYPE_CHECKING:
 class Event:
     """What a worker takes: the message of the callback (None for a timer) and its timeline so far.
 
-    `in_slot`: it came over a hardware-mapped topic, so a slot need not read it from main memory.
+    `in_slot`: it came over a hardware-mapped topic, so a slot need not read it from main memory. `size` is
+    that of a subscription's message in bytes on the wire.
     """
 
     message: Any
     timeline: Timeline
     responder: Responder | None = None
     in_slot: bool = False
+    size: int = 0
 
 
 class Source(Protocol):
@@ -137,7 +139,7 @@ class Reader:
         yield from way
         if len(self._queue) == self._queue.maxlen:
             self._overwritten += 1
-        self._queue.append(Event(received.message, timeline, received.responder))
+        self._queue.append(Event(received.message, timeline, received.responder, size=received.size))
         self._on_ready()
 
 

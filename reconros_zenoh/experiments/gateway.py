@@ -119,12 +119,18 @@ def measure_gateway(
         "clock": clock,
         "repeat": repeat,
         "profile": profile.name,
+        "statistic": "mean",
         "cells": [cell.as_json() for cell in cells],
         "anchors": anchors(cells),
-        "host": {
-            "machine": f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores",
-            "overruns": overruns,
-        },
+        "host": host(overruns),
+    }
+
+
+def host(overruns: int) -> dict[str, Any]:
+    """Return what is known of this host, and how often it was slower than the model."""
+    return {
+        "machine": f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores",
+        "overruns": overruns,
     }
 
 
@@ -257,8 +263,8 @@ class _Rounds:
     def _begin(self) -> None:
         self._number += 1
         self._got.clear()
-        self._ready = True
         self._environment.call_later(_LIMIT_NS, self._give_up, self._number)
+        self._ready = True
         self._on_ready()
 
     def _note(self, name: str, number: int, transmission_ns: int) -> None:
