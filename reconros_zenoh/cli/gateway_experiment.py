@@ -109,6 +109,9 @@ def _print(console: Console, result: dict[str, Any]) -> None:
             f"{anchor['name']}: speedup {anchor['ours']:.2f}, paper {anchor['paper']:g} "
             f"({anchor['error']:+.1%})"
         )
+    lost = sum(cell[variant]["lost"] for cell in result["cells"] for variant in ("smt", "gateway"))
+    if lost:
+        console.print(f"{lost} messages were lost to somebody and are not in the times")
     for line in result.get("copies", ()):
         console.print(line)
 

@@ -42,10 +42,18 @@ _PAUSE_NS = 1_000_000
 
 @dataclass(frozen=True, slots=True)
 class Times:
-    """Mean transmission times [ms]: the largest over the subscribers in hardware, and that to software."""
+    """Transmission times [ms]: the largest over the subscribers in hardware, and that to software.
+
+    Messages that were `lost` to somebody are not in them.
+    """
 
     hw_max_ms: float
     sw_ms: float
+    lost: int = 0
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the times under the names of the experiment's JSON."""
+        return {"hw_max_ms": self.hw_max_ms, "sw_ms": self.sw_ms, "lost": self.lost}
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,8 +72,8 @@ class Cell:
             "publisher": self.publisher,
             "size": self.size,
             "subscribers": self.subscribers,
-            "smt": {"hw_max_ms": self.smt.hw_max_ms, "sw_ms": self.smt.sw_ms},
-            "gateway": {"hw_max_ms": self.gateway.hw_max_ms, "sw_ms": self.gateway.sw_ms},
+            "smt": self.smt.as_json(),
+            "gateway": self.gateway.as_json(),
             "speedup_hw": self.speedup_hw,
             "speedup_sw": self.speedup_sw,
         }
