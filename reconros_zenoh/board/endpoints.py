@@ -32,7 +32,8 @@ class Event:
     """What a worker takes: the message of the callback (None for a timer) and its timeline so far.
 
     `message_type` is None for what has no place in memory as a C struct. `in_slot`: it came over a
-    hardware-mapped topic, so a slot need not read it from main memory.
+    hardware-mapped topic, so a slot need not read it from main memory. `size` is that of a subscription's
+    message in bytes on the wire.
     """
 
     message: Any
@@ -40,6 +41,7 @@ class Event:
     responder: Responder | None = None
     message_type: MessageType | None = None
     in_slot: bool = False
+    size: int = 0
 
 
 class Source(Protocol):
@@ -149,7 +151,8 @@ class Reader:
     def _receive(self, incoming: _Incoming) -> Generator[Awaitable, object, None]:
         received, timeline, way = incoming
         if (yield from way):
-            self.enqueue(Event(received.message, timeline, received.responder, self._message_type))
+            message, size = received.message, received.size
+            self.enqueue(Event(message, timeline, received.responder, self._message_type, size=size))
         else:
             self._lost += 1
 
