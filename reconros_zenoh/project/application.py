@@ -197,13 +197,15 @@ class Application:
         check: Callable[[Any], None] | None = None,
         software_timing: Timing | None = None,
         hardware_timing: Timing | None = None,
+        limit_ms: float | None = None,
         qos: QosProfile | None = None,
     ) -> None:
         """Let the callback `name` of build.cfg run where the mapping wants it, whenever `resource` is ready.
 
         That is a subscription, service, action, client or timer of its resource groups; `check` raises
-        BadMessageError for bad messages; the timings say how long it takes where the profile's table does
-        not; `qos` is as in `source`. The executor is the one that the mapping describes; `spin` starts it.
+        BadMessageError for bad messages; the timings say how long it takes where the profile's table does not;
+        `limit_ms` is the longest that a call may take; `qos` is as in `source`. The executor is the one that
+        the mapping describes; `spin` starts it.
         """
         threads = {thread.name: thread for thread in self.project.configuration.threads}
         if name not in threads:
@@ -224,11 +226,13 @@ class Application:
         if place.software:
             if software is None:
                 raise UsageError(f"callback {name!r} is mapped to software, but no `software` is given.")
-            executor.add_sw_callback(name, kind, source, software, check, software_timing)
+            executor.add_sw_callback(name, kind, source, software, check, software_timing, limit_ms)
         if place.slots:
             if hardware is None:
                 raise UsageError(f"callback {name!r} is mapped to hardware, but no `hardware` is given.")
-            executor.add_hw_callback(name, place.slots, kind, source, hardware, check, hardware_timing)
+            executor.add_hw_callback(
+                name, place.slots, kind, source, hardware, check, hardware_timing, limit_ms
+            )
 
     def spin(self, executor: Executor | None = None) -> None:
         """Start the workers of an executor of one's own or of the one that `register` has filled.
