@@ -203,9 +203,9 @@ class Application:
         """Let the callback `name` of build.cfg run where the mapping wants it, whenever `resource` is ready.
 
         That is a subscription, service, action, client or timer of its resource groups; `check` raises
-        BadMessageError for bad messages; the timings say how long it takes where the profile's table does not;
-        `limit_ms` is the longest that a call may take; `qos` is as in `source`. The executor is the one that
-        the mapping describes; `spin` starts it.
+        BadMessageError for bad messages; the timings say how long it takes where the profile's table does
+        not; `limit_ms` is the longest that a call may take; `qos` is as in `source`. The executor is the one
+        that the mapping describes; `spin` starts it.
         """
         threads = {thread.name: thread for thread in self.project.configuration.threads}
         if name not in threads:
