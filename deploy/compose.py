@@ -14,7 +14,7 @@ from enum import StrEnum
 from graphlib import CycleError, TopologicalSorter
 from typing import TYPE_CHECKING, Any
 
-from deploy.yaml_node import Node
+from reconros_zenoh.yaml_node import Node
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping

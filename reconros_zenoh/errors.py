@@ -2,8 +2,9 @@
 
 ReconrosError
 ├── UsageError             what the user gave cannot be used: the command ends with status 2
-│   └── FileError          the same, with the file and line it stands in
-│       └── BitstreamError a bitstream that is damaged or meant for another slot
+│   ├── FileError          the same, with the file and line it stands in
+│   │   └── BitstreamError a bitstream that is damaged or meant for another slot
+│   └── GraphError         a computation graph that cannot be, with the place of the mistake in it
 ├── TransportError         the network did not do what was asked (no router, port in use, closed)
 ├── BadMessageError        a message that is counted and dropped; never ends a process
 ├── CallbackError          a callback that did what it may not; it is failed, the board goes on
@@ -42,6 +43,20 @@ class FileError(UsageError):
 
 class BitstreamError(FileError):
     """A bitstream file that is damaged or belongs to another slot or callback."""
+
+
+class GraphError(UsageError):
+    """A computation graph that cannot be.
+
+    `place` leads to the mistake as it would in a graph file: `("topics", "A", "publishers", 1)` is the second
+    publisher of topic A.
+    """
+
+    def __init__(self, place: tuple[str | int, ...], problem: str, remedy: str) -> None:
+        self.place = place
+        self.problem = problem
+        self.remedy = remedy
+        super().__init__(f"{'.'.join(map(str, place))} {problem} {remedy}")
 
 
 class TransportError(ReconrosError):

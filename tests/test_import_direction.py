@@ -22,7 +22,7 @@ MOST_LINES = 400
 
 # From top to bottom: a module may import from its own line and from those above.
 ORDER = (
-    ("reconros_zenoh.errors", "reconros_zenoh.toml_file"),
+    ("reconros_zenoh.errors", "reconros_zenoh.toml_file", "reconros_zenoh.yaml_node"),
     ("reconros_zenoh.executor",),
     ("reconros_zenoh.clock",),
     ("reconros_zenoh.ros",),
@@ -30,6 +30,7 @@ ORDER = (
     ("reconros_zenoh.rmw",),
     ("reconros_zenoh.board",),
     ("reconros_zenoh.project",),
+    ("reconros_zenoh.mapping",),
     ("reconros_zenoh.measure",),
     ("reconros_zenoh.applications",),
     ("board_daemon",),
@@ -43,7 +44,8 @@ ORDER = (
 
 # The waist: what lies between transport and the processes sees a Transport and nothing of its kinds.
 BEHIND_THE_WAIST = tuple(
-    f"reconros_zenoh.{package}" for package in ("rmw", "board", "project", "measure", "applications")
+    f"reconros_zenoh.{package}"
+    for package in ("rmw", "board", "project", "mapping", "measure", "applications")
 )
 MAY_IMPORT_ZENOH = ("reconros_zenoh.transport.zenoh",)
 MAY_IMPORT_ZENOH_TRANSPORT = (

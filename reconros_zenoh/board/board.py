@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from reconros_zenoh.board.address_space import AddressSpace
 from reconros_zenoh.board.cpu import Cpu
 from reconros_zenoh.board.dds import DdsStack
-from reconros_zenoh.board.host import Host
+from reconros_zenoh.board.host import IN_LINE_NS, Host
 from reconros_zenoh.board.memif import Memif
 from reconros_zenoh.board.osif import Osif
 from reconros_zenoh.board.slots import ReconfigurableSlot
@@ -74,7 +74,8 @@ class Board:
         self.zycap = ZyCAP(environment, self.cpu, model.icap if model else None, model.dds if model else None)
         self.randomness = random.Random(f"{seed} {name}")
         self.dds = DdsStack(environment, self.cpu, model, self.randomness)
-        self.host = Host(environment, threads)
+        # Without a model no event has a time that it could miss.
+        self.host = Host(environment, threads, IN_LINE_NS if model else 10 * IN_LINE_NS)
         self.spans = Spans()
         self.slots: Mapping[int, ReconfigurableSlot] = {
             plan.slot_id: ReconfigurableSlot(

@@ -31,6 +31,11 @@ class Cpu:
         """Return when the stack has had `core_time_ns`, of one core at most `share` at a time."""
         return self._cores.serve(core_time_ns, share, first=True)
 
+    @property
+    def is_busy(self) -> bool:
+        """Whether other threads keep every core busy, or the stack is stalled."""
+        return self._cores.is_saturated
+
     def stall_stack(self) -> None:
         """Keep the communication stack from running until `resume_stack`."""
         self._cores.hold_first()

@@ -36,8 +36,10 @@ class DdsStack:
     direction: a small message that comes behind a large one waits for it. On the real board that is what
     delays a small round trip by most of a Sobel image's way in and out (reference data, DESIGN.md).
 
-    A large message may lose a fragment: then it is resent whole after `nack_delay`, or, when the request for
-    it is lost too, after the next heartbeat of its writer.
+    A large message that comes in may lose a fragment: then it is resent whole after `nack_delay`, or, when
+    the request for it is lost too, after the next heartbeat of its writer. What comes while all cores are
+    busy or the stack is stalled is lost more often, because the thread that empties the socket gets its turn
+    late. The desktop loses nothing.
 
     The link is charged here rather than in the transport, so that the same model holds in both clocks. In
     wall time a message has spent some of the modelled link time in the real network already: its source
@@ -62,13 +64,15 @@ class DdsStack:
             self._link_ns_per_byte = link.per_byte.ns_per_byte
             self._message_ns = dds.per_message.ns
             self._ns_per_byte = dds.per_byte.ns_per_byte
-            self._ns_per_byte_large = dds.per_byte_large.ns_per_byte
+            self._receive_ns_per_byte = dds.receive_per_byte_large.ns_per_byte
+            self._send_ns_per_byte = dds.send_per_byte_large.ns_per_byte
             self._large_from = dds.large_from.bytes
             self._core_share = dds.core_share.share
             self._jitter = dds.jitter.share
             self._nack_probability = dds.nack_probability.share
             self._nack_delay_ns = dds.nack_delay.ns
             self._loss_probability = dds.loss_probability.share
+            self._loss_probability_busy = dds.loss_probability_busy.share
             self._heartbeat_ns = dds.heartbeat_period.ns
 
     def receive(
@@ -88,27 +92,23 @@ class DdsStack:
         left_ns = min(timeline.started_ns, self._environment.now)
         yield from self._until(left_ns + self._link_ns(size))
         timeline.mark("transport")
-        yield from self._process(size)
+        probability = self._loss_probability_busy if self._cpu.is_busy else self._loss_probability
+        yield from self._process(size, self._receive_ns_per_byte)
         timeline.mark("dds")
-        return (yield from self._repair(size, timeline, reliable=reliable))
+        return size <= self._large_from or (
+            yield from self._repair(size, timeline, probability, reliable=reliable)
+        )
 
-    def send(
-        self, size: int, timeline: Timeline, *, reliable: bool = True
-    ) -> Generator[Awaitable, object, bool]:
-        """Return when a message of `size` bytes has gone through the stack and over the link.
-
-        False: it was lost on the way, as in `receive`.
-        """
+    def send(self, size: int, timeline: Timeline) -> Generator[Awaitable, object, None]:
+        """Return when a message of `size` bytes has gone through the stack and over the link."""
         if not self._modelled:
             timeline.mark("dds")
-            return True
-        yield from self._process(size)
+            return
+        yield from self._process(size, self._send_ns_per_byte)
         timeline.mark("dds")
-        complete = yield from self._repair(size, timeline, reliable=reliable)
         arrives_ns = self._environment.now + self._link_ns(size)
         yield from self._until(arrives_ns - round(self._transit_ns[size > self._large_from]))
         timeline.mark("transport")
-        return complete
 
     def _link_ns(self, size: int) -> int:
         return self._latency_ns + round(size * self._link_ns_per_byte)
@@ -117,9 +117,9 @@ class DdsStack:
         if time_ns > self._environment.now:
             yield self._environment.timeout(time_ns - self._environment.now)
 
-    def _process(self, size: int) -> Generator[Awaitable, object, None]:
+    def _process(self, size: int, ns_per_byte_large: float) -> Generator[Awaitable, object, None]:
         """Return when the stack has worked on a message of `size` bytes."""
-        ns_per_byte = self._ns_per_byte_large if size > self._large_from else self._ns_per_byte
+        ns_per_byte = ns_per_byte_large if size > self._large_from else self._ns_per_byte
         duration_ns = self._message_ns + size * ns_per_byte
         if self._jitter:
             duration_ns *= self._randomness.lognormvariate(0, self._jitter)
@@ -132,18 +132,18 @@ class DdsStack:
         yield from self._cpu.run_stack(passage.duration_ns * self._core_share, self._core_share)
         passage.done.fire()
 
-    def _repair(self, size: int, timeline: Timeline, *, reliable: bool) -> Generator[Awaitable, object, bool]:
+    def _repair(
+        self, size: int, timeline: Timeline, loss_probability: float, *, reliable: bool
+    ) -> Generator[Awaitable, object, bool]:
         """Return when no fragment of a large message is missing any more; False when one is for ever."""
-        if size <= self._large_from:
-            return True
         if not reliable:
-            lost = self._randomness.random() < self._loss_probability
+            lost = self._randomness.random() < loss_probability
             return not lost and self._randomness.random() >= self._nack_probability
-        if self._randomness.random() < self._loss_probability:
+        if self._randomness.random() < loss_probability:
             yield self._environment.timeout(round(self._randomness.uniform(0, self._heartbeat_ns)))
             timeline.mark("retransmission")
         while self._randomness.random() < self._nack_probability:
             yield self._environment.timeout(self._nack_delay_ns)
-            yield from self._process(size)
+            yield from self._process(size, self._receive_ns_per_byte)
             timeline.mark("retransmission")
         return True

@@ -220,23 +220,19 @@ class Writer:
 
     def __init__(self, board: Board, qos: QosProfile) -> None:
         self._board = board
-        self._reliable = qos.reliability is Reliability.RELIABLE
         self._stream: Stream[_Outgoing] = Stream(self._send, qos.queue_depth)
-        self._lost = 0
 
     @property
     def dropped(self) -> int:
-        """How many messages were pushed out by newer ones or, with best effort, lost."""
-        return self._stream.dropped + self._lost
+        """How many messages were pushed out by newer ones."""
+        return self._stream.dropped
 
     def put(self, parts: Parts, timeline: Timeline, send: Callable[[], None]) -> None:
         """Have `send` called when a message of these parts has gone through the stack and over the link."""
         self._stream.put(_Outgoing(send, sum(len(part) for part in parts), timeline))
 
     def _send(self, outgoing: _Outgoing) -> Generator[Awaitable, object, None]:
-        if not (yield from self._board.dds.send(outgoing.size, outgoing.timeline, reliable=self._reliable)):
-            self._lost += 1
-            return
+        yield from self._board.dds.send(outgoing.size, outgoing.timeline)
         # A large message is copied into the transport: not by the thread that keeps the clock.
         yield from self._board.host.result(self._board.host.start(self, outgoing.send))
         self._board.spans.add(outgoing.timeline)
@@ -254,7 +250,7 @@ class TopicWriter:
 
     @property
     def dropped(self) -> int:
-        """How many messages were pushed out by newer ones or lost."""
+        """How many messages were pushed out by newer ones."""
         return self._writer.dropped
 
     def message(self, **fields: object) -> Any:

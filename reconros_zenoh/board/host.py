@@ -24,7 +24,7 @@ R = TypeVar("R")
 R_co = TypeVar("R_co", covariant=True)
 _RESULTS_KEPT = 512
 _RUNS_REMEMBERED = 32
-_IN_LINE_NS = 100_000
+IN_LINE_NS = 100_000
 """About what it costs to hand a computation to another thread and its result back."""
 
 
@@ -69,14 +69,19 @@ class _Done(Generic[R_co]):
 class Host:
     """Runs the real computation while the model decides when its result is ready.
 
-    In wall time what takes long runs in a pool of threads, and what is known to be over sooner than a thread
-    could be woken runs in line. In virtual time everything runs in line, and a pure kernel computes equal
-    inputs once.
+    In wall time what takes long runs in a pool of threads, what is known to be over soon in line. In virtual
+    time everything runs in line, and a pure kernel computes equal inputs once.
     """
 
-    def __init__(self, environment: VirtualEnvironment, threads: int | None) -> None:
-        """`threads` is the size of the pool, None in virtual time."""
+    def __init__(
+        self, environment: VirtualEnvironment, threads: int | None, in_line_ns: int = IN_LINE_NS
+    ) -> None:
+        """`threads` is the size of the pool, None in virtual time.
+
+        What is expected to take less than `in_line_ns` runs in line: it holds up the event loop that long.
+        """
         self._environment = environment
+        self._in_line_ns = in_line_ns
         self._pool = None if threads is None else ThreadPoolExecutor(threads, "computation")
         self._expected_ns: dict[object, float] = {}
         self._results: OrderedDict[object, object] = OrderedDict()
@@ -92,7 +97,7 @@ class Host:
         """
         if limit is not None:
             return self._start_limited(limit, function, *arguments)
-        if self._pool is not None and self._expected_ns.get(task, _IN_LINE_NS) >= _IN_LINE_NS:
+        if self._pool is not None and self._expected_ns.get(task, self._in_line_ns) >= self._in_line_ns:
             return self._pool.submit(self._timed, task, function, *arguments)
         try:
             return _Done(self._timed(task, function, *arguments), None)

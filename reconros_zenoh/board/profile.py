@@ -68,22 +68,25 @@ class DdsSection(_Section):
     """The ROS 2 communication stack, per message and direction.
 
     A message takes `per_message` and its bytes; one of more than `large_from` goes in fragments of that size
-    and takes `per_byte_large`. Meanwhile the stack keeps one core busy for `core_share` of the time. Times
-    vary by `jitter` (standard deviation of their logarithm). A large message is resent whole with probability
-    `nack_probability`, `nack_delay` after its first copy; with `loss_probability` it waits for the next
-    heartbeat of its writer, one per `heartbeat_period`. `recovery` is how long the stack needs to go on after
-    a reconfiguration stalled it.
+    and takes `receive_per_byte_large` or `send_per_byte_large`. Meanwhile the stack keeps one core busy for
+    `core_share` of the time. Times vary by `jitter` (standard deviation of their logarithm). A large message
+    that comes in is resent whole with probability `nack_probability`, `nack_delay` after its first copy. With
+    `loss_probability`, or `loss_probability_busy` if it comes while all cores are busy or the stack is
+    stalled, it waits for the next heartbeat of its writer, one per `heartbeat_period`. `recovery` is how long
+    the stack needs to go on after a reconfiguration stalled it.
     """
 
     per_message: Duration
     per_byte: CostPerByte
-    per_byte_large: CostPerByte
+    receive_per_byte_large: CostPerByte
+    send_per_byte_large: CostPerByte
     large_from: Size
     core_share: Share
     jitter: Fraction
     nack_probability: RetryProbability
     nack_delay: Duration
     loss_probability: Fraction
+    loss_probability_busy: Fraction
     heartbeat_period: Duration
     recovery: Duration
     stalled_by_reconfiguration: bool
@@ -106,6 +109,34 @@ class IcapSection(_Section):
 class MemifSection(_Section):
     """The memory interface that all slots share."""
 
+    bandwidth: Bandwidth
+
+
+class TopicsSection(_Section):
+    """Software-mapped topics between the nodes of one board (Mapping and Optimizing, Section 4).
+
+    A message takes `publish`, then `notify_hardware` for each subscriber in hardware. A software publisher
+    copies it in first (`copy_in`). Between software nodes it takes `notify_software` and `copy_out` for each
+    subscriber in hardware.
+    """
+
+    publish: Duration
+    notify_hardware: Duration
+    notify_software: Duration
+    copy_in: CostPerByte
+    copy_out: CostPerByte
+
+
+class GatewaySection(_Section):
+    """What a gateway adds: `cancel` takes back its request to the delegate."""
+
+    cancel: Duration
+
+
+class HmtSection(_Section):
+    """Hardware-mapped topics: a message takes `overhead` and its bytes on the stream."""
+
+    overhead: Duration
     bandwidth: Bandwidth
 
 
@@ -153,6 +184,9 @@ class Model(_Section):
     osif: OsifSection
     bitstreams: Annotated[tuple[BitstreamSection, ...], Field(min_length=1, strict=False)]
     callbacks: dict[str, CallbackSection]
+    topics: TopicsSection | None = None
+    gateway: GatewaySection | None = None
+    hmt: HmtSection | None = None
 
 
 class Profile(_Section):

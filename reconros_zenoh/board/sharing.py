@@ -72,6 +72,11 @@ class SharedResource:
             self._share()
             raise
 
+    @property
+    def is_saturated(self) -> bool:
+        """Whether a job marked `first` that comes now finds all of it in use, or itself held."""
+        return self._holds > 0 or sum(job.limit for job in self._jobs if not job.first) >= self._capacity
+
     def hold_first(self) -> None:
         """Stop serving the jobs marked `first` until as many `release_first`; their work waits."""
         self._holds += 1

@@ -12,15 +12,9 @@ import typer
 from rich.console import Console
 
 from reconros_zenoh.board.control import ask_status
+from reconros_zenoh.cli.options import ENDPOINT, AsJson, Domain, Router
 from reconros_zenoh.experiments.roundtrip import application_folder
 from reconros_zenoh.transport.zenoh import ZenohRouter, ZenohTransport
-
-ENDPOINT = "tcp/127.0.0.1:7447"
-Router = Annotated[
-    str, typer.Option(metavar="ENDPOINT", envvar="RECONROS_ROUTER", help="The Zenoh router to connect to.")
-]
-Domain = Annotated[int, typer.Option(min=0, max=232, envvar="ROS_DOMAIN_ID", help="The ROS domain.")]
-AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
 
 
 class ClientName(StrEnum):

@@ -28,6 +28,7 @@ _VERBS = {
     "check": ("check", "check"),
     "run": ("run", "run"),
     "build": ("build", "build"),
+    "map": ("map", "map_communication"),
 }
 """Each verb with its module in this package and its name there, in the order of `reconros --help`."""
 

@@ -21,3 +21,9 @@ Profile = Annotated[
 ]
 Out = Annotated[Path, typer.Option(metavar="DIR", help="Folder for the records.")]
 Seed = Annotated[int, typer.Option(help="Seed of requests and model.")]
+ENDPOINT = "tcp/127.0.0.1:7447"
+Router = Annotated[
+    str, typer.Option(metavar="ENDPOINT", envvar="RECONROS_ROUTER", help="The Zenoh router to connect to.")
+]
+Domain = Annotated[int, typer.Option(min=0, max=232, envvar="ROS_DOMAIN_ID", help="The ROS domain.")]
+AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]

@@ -14,8 +14,7 @@ from rich.console import Console
 from board_daemon.hosting import BoardOptions
 from reconros_zenoh.board.control import status
 from reconros_zenoh.board.profile import profile_names, read_profile
-from reconros_zenoh.cli.daemons import ENDPOINT, AsJson, Domain, Router
-from reconros_zenoh.cli.options import ClockName
+from reconros_zenoh.cli.options import ENDPOINT, AsJson, ClockName, Domain, Router
 from reconros_zenoh.errors import UsageError
 from reconros_zenoh.project.loader import load_project
 from reconros_zenoh.project.target import target_profile

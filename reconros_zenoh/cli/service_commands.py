@@ -11,7 +11,6 @@ from typer.main import get_command
 
 from board_daemon.hosting import BoardOptions
 from deploy.compose import Condition, read_compose
-from deploy.yaml_node import Node
 from host_clients.daemon import ClientOptions
 from reconros_zenoh.board.profile import read_profile
 from reconros_zenoh.cli import daemons
@@ -19,6 +18,7 @@ from reconros_zenoh.errors import FileError, UsageError
 from reconros_zenoh.experiments.deployment import BoardPlan, DeploymentPlan
 from reconros_zenoh.experiments.roundtrip import application_folder
 from reconros_zenoh.project.loader import load_project
+from reconros_zenoh.yaml_node import Node
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping

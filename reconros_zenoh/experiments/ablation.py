@@ -26,7 +26,10 @@ MECHANISMS: dict[str, Mapping[tuple[str, ...], float | bool]] = {
     COMPLETE: {},
     "jitter of the DDS stack and of polling": {(*_DDS, "jitter"): 0.0, (*_EXECUTOR, "poll_jitter"): 0.0},
     "resending after a NACK": {(*_DDS, "nack_probability"): 0.0},
-    "loss, repaired at the next heartbeat": {(*_DDS, "loss_probability"): 0.0},
+    "loss, repaired at the next heartbeat": {
+        (*_DDS, "loss_probability"): 0.0,
+        (*_DDS, "loss_probability_busy"): 0.0,
+    },
     "stall of the DDS stack by reconfiguration": {
         (*_DDS, "stalled_by_reconfiguration"): False,
         (*_DDS, "recovery"): 0.0,

@@ -178,7 +178,7 @@ def _without_losses(profile: Profile, model: Model) -> Profile:
     """Return the profile with a network that loses nothing: the table is not about waiting for it."""
     never = {
         name: getattr(model.dds, name).model_copy(update={"value": 0.0})
-        for name in ("nack_probability", "loss_probability")
+        for name in ("nack_probability", "loss_probability", "loss_probability_busy")
     }
     dds = model.dds.model_copy(update=never)
     return profile.model_copy(update={"model": model.model_copy(update={"dds": dds})})

@@ -15,7 +15,7 @@ from board_daemon.hosting import BoardOptions
 from host_clients.daemon import ClientOptions
 from reconros_zenoh.board.profile import Profile
 from reconros_zenoh.errors import ExperimentError
-from reconros_zenoh.experiments.roundtrip import CLIENTS, application_folder
+from reconros_zenoh.experiments.roundtrip import ANSWER_LIMIT_S, CLIENTS, application_folder
 from reconros_zenoh.experiments.simulation import Simulation
 from reconros_zenoh.measure.record import Record
 from reconros_zenoh.project.loader import load_project
@@ -109,7 +109,13 @@ def records_of(run: Run) -> dict[str, Record]:
         )
         for client in CLIENTS:
             options = ClientOptions(
-                client, "", run.requests, seed=run.seed, group="roundtrip", members=len(CLIENTS)
+                client,
+                "",
+                run.requests,
+                limit_s=ANSWER_LIMIT_S,
+                seed=run.seed,
+                group="roundtrip",
+                members=len(CLIENTS),
             )
             simulation.add_client(options, round_trips[client].append)
         simulation.run()

@@ -225,11 +225,17 @@ class Application:
         place = self.mapping.callbacks[name]
         if place.software:
             if software is None:
-                raise UsageError(f"callback {name!r} is mapped to software, but no `software` is given.")
+                raise UsageError(
+                    f"callback {name!r} is mapped to software, but no `software` is given. Give it, or "
+                    "map the callback to reconfigurable slots."
+                )
             executor.add_sw_callback(name, kind, source, software, check, software_timing, limit_ms)
         if place.slots:
             if hardware is None:
-                raise UsageError(f"callback {name!r} is mapped to hardware, but no `hardware` is given.")
+                raise UsageError(
+                    f"callback {name!r} is mapped to hardware, but no `hardware` is given. Give it, or "
+                    "map the callback to software."
+                )
             executor.add_hw_callback(
                 name, place.slots, kind, source, hardware, check, hardware_timing, limit_ms
             )

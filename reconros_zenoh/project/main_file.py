@@ -48,7 +48,7 @@ def running_project(folder: Path) -> Iterator[None]:
     sys.path.insert(0, str(root))
     try:
         yield
-    except (FileError, KeyboardInterrupt):
+    except FileError:
         raise
     except UsageError as error:
         path, line = _place(error, root)
@@ -71,9 +71,12 @@ def running_project(folder: Path) -> Iterator[None]:
 
 
 def _lies_in(module: ModuleType, root: Path) -> bool:
+    """Tell whether a top-level module stands in the folder itself, not in an environment below it."""
     file = getattr(module, "__file__", None)
-    places = [file] if file else getattr(module, "__path__", ())
-    return any(Path(place).is_relative_to(root) for place in places)
+    if file is None:  # a package without __init__.py
+        return any(Path(place).parent == root for place in getattr(module, "__path__", ()))
+    path = Path(file)
+    return root in {path.parent, path.parent.parent if path.name == "__init__.py" else None}
 
 
 def _place(error: Exception, root: Path) -> tuple[Path, int | None]:
@@ -81,5 +84,9 @@ def _place(error: Exception, root: Path) -> tuple[Path, int | None]:
     places = [(Path(frame.filename), frame.lineno) for frame in traceback.extract_tb(error.__traceback__)]
     if isinstance(error, SyntaxError) and error.filename:
         places.append((Path(error.filename), error.lineno))
-    own = [(path.relative_to(root), line) for path, line in places if path.is_relative_to(root)]
+    own = [
+        (path.relative_to(root), line)
+        for path, line in places
+        if path.is_relative_to(root) and "site-packages" not in path.parts
+    ]
     return own[-1] if own else (Path("main.py"), None)

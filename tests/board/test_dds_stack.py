@@ -25,7 +25,8 @@ COSTS = {
     "link_byte_ns": 2,
     "dds_message_ns": 100,
     "dds_byte_ns": 3,
-    "dds_byte_large_ns": 5,
+    "dds_byte_received_ns": 5,
+    "dds_byte_sent_ns": 4,
     "large_from": 1000,
 }
 PROFILE = small_profile(**COSTS)  # type: ignore[arg-type] # each value fits its parameter
@@ -34,6 +35,7 @@ LOSSY = small_profile(
     nack_probability=0.1,
     nack_delay_ns=10_000,
     loss_probability=0.01,
+    loss_probability_busy=0.3,
     heartbeat_ns=3_000_000,
 )
 NATIVE = PROFILE.model_copy(update={"model": None})
@@ -115,16 +117,16 @@ def test_messages_pass_the_stack_one_at_a_time_whatever_their_direction() -> Non
 
 
 def test_a_small_message_behind_a_large_one_waits_for_it() -> None:
-    stack = Stack(PROFILE, 1.0, 1.0)
-    stack.begin("large", "out", 2000)  # in the stack until 10100
+    stack = Stack()
+    stack.begin("large", "out", 2000)  # in the stack until 8100
     small, _ = stack.begin("small", "out", 0)
     stack.environment.run()
-    assert stages(small) == {"dds": 10_100 + 100, "transport": 500}
+    assert stages(small) == {"dds": 8_100 + 100, "transport": 500}
 
 
 def test_a_large_message_crosses_the_link_before_or_after_the_stack_works_on_it() -> None:
     assert Stack(PROFILE, 1.0, 1.0).receive(2000) == {"transport": 4500, "dds": 10_100}
-    assert Stack(PROFILE, 1.0, 1.0).send(2000) == {"dds": 10_100, "transport": 4500}
+    assert Stack().send(2000) == {"dds": 8_100, "transport": 4500}
 
 
 def test_a_large_message_costs_more_per_byte() -> None:
@@ -148,12 +150,23 @@ def test_a_large_message_whose_repair_is_lost_too_waits_for_the_next_heartbeat()
     assert stack.draws.numbers == []
 
 
-def test_what_the_board_sends_can_be_lost_too() -> None:
-    assert Stack(LOSSY, 0.5, 0.05, 0.9).send(2000) == {
-        "dds": 10_100,
-        "retransmission": 10_000 + 10_100,
-        "transport": 4500,
-    }
+def test_what_the_board_sends_is_not_lost() -> None:
+    stack = Stack(LOSSY)
+    assert stack.send(2000) == {"dds": 8_100, "transport": 4500}
+
+
+def test_what_comes_while_all_cores_are_busy_is_lost_more_often() -> None:
+    stack = Stack(LOSSY, 0.29, 0.5, 0.9)
+    start(stack.environment, stack.cpu.run(100_000))
+    assert stack.receive(2000)["retransmission"] == 1_500_000
+    assert "retransmission" not in Stack(LOSSY, 0.29, 0.9).receive(2000)
+
+
+def test_what_comes_while_the_stack_is_stalled_is_lost_more_often() -> None:
+    stack = Stack(LOSSY, 0.29, 0.5, 0.9)
+    stack.cpu.stall_stack()
+    stack.environment.call_later(5000, stack.cpu.resume_stack)
+    assert stack.receive(2000)["retransmission"] == 1_500_000
 
 
 def test_a_small_message_is_never_lost() -> None:

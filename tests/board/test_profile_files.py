@@ -145,8 +145,8 @@ MISTAKES = {
         "Input should be less than 1",
     ),
     "resent for ever": (
-        "nack_probability = { value = 0.14",
-        "nack_probability = { value = 1",
+        "nack_probability = { value = 0.",
+        "nack_probability = { value = 1.",
         "nack_probability =",
         "Input should be less than 1",
     ),

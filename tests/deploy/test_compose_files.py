@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 import deploy
 from deploy.compose import Condition, Deployment, Healthcheck, Service, duration_ns, read_compose
-from deploy.yaml_node import Node
 from reconros_zenoh.errors import FileError
+from reconros_zenoh.yaml_node import Node
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -123,7 +123,7 @@ def test_anchors_and_merges(read: Callable[..., Deployment]) -> None:
 ERRORS = {
     "services: {a: {command: [}": (1, "is not YAML"),
     "services: \x00": (1, "character"),
-    "a: 1\na: 2": (2, "duplicate key"),
+    "a: 1\na: 2": (2, "a stands twice"),
     "- services": (1, "but is a list"),
     "": (1, "the file must be a mapping (`key: value`), but is empty"),
     "name: x": (1, "has no services"),

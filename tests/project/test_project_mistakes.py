@@ -158,3 +158,27 @@ def test_a_project_by_a_relative_path(tmp_path: Path, monkeypatch: pytest.Monkey
     monkeypatch.chdir(tmp_path)
     with pytest.raises(FileError, match=r"^blink/callbacks\.py:1: ZeroDivisionError"):
         load_project(tmp_path.joinpath("blink").relative_to(tmp_path))
+
+
+@pytest.mark.parametrize("package", ["steps", "steps_without_init"])
+def test_modules_of_a_project_are_forgotten_and_those_of_its_environment_are_not(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, package: str
+) -> None:
+    new_project(tmp_path / "blink")
+    site = tmp_path / "blink" / ".venv" / "site-packages"
+    for folder in (site, tmp_path / "blink" / package):
+        folder.mkdir(parents=True)
+    if package == "steps":
+        (tmp_path / "blink" / package / "__init__.py").touch()
+    (tmp_path / "blink" / package / "first.py").touch()
+    (site / "installed_there.py").write_text("def fail():\n    raise ValueError('no')\n", encoding="utf-8")
+    main = tmp_path / "blink" / "main.py"
+    main.write_text(
+        f"import {package}.first\nimport installed_there\ndef main(app):\n    installed_there.fail()\n",
+        encoding="utf-8",
+    )
+    monkeypatch.syspath_prepend(site)
+    with pytest.raises(FileError, match=r"main\.py:4: ValueError: no"):
+        start(tmp_path / "blink")
+    assert not {package, f"{package}.first"} & set(sys.modules)
+    assert sys.modules.pop("installed_there")

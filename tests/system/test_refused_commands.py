@@ -142,6 +142,23 @@ def test_a_folder_that_cannot_be_written(tmp_path: Path, command: tuple[object, 
     assert_refused(*command, option, place, says=(place, "Choose an"))
 
 
+def test_a_node_that_does_not_run(network: Network) -> None:
+    assert_refused(
+        "map",
+        "--live",
+        "--router",
+        network.endpoint,
+        "--hardware=/nobody",
+        says=("no node /nobody runs", "/sobel_node"),
+    )
+
+
+def test_a_mistake_in_a_graph_file(tmp_path: Path) -> None:
+    graph = tmp_path / "graph.yaml"
+    graph.write_text("nodes: {n1: hardware}\ntopics:\n  A: {publishers: [n2]}\n", encoding="utf-8")
+    assert_refused("map", graph, says=(f"{graph}:3: ", "is the unknown node 'n2'", "Known nodes: n1."))
+
+
 def test_a_damaged_bitstream(network: Network, tmp_path: Path) -> None:
     built = run("build", application_folder(), "--out", tmp_path, "--json")
     assert (built.returncode, built.stderr) == (0, "")

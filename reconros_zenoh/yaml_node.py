@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from ruamel.yaml import YAML
+from ruamel.yaml.constructor import DuplicateKeyError
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 from ruamel.yaml.reader import ReaderError
 
@@ -21,6 +22,8 @@ _VARIABLE = re.compile(
     rf"\$(?:(?P<dollar>\$)|(?P<plain>{_NAME})"
     rf"|\{{(?P<braced>{_NAME})(?:(?P<sign>:?-)(?P<default>[^${{}}]*))?\}}|(?P<wrong>))"
 )
+# The parser's words; behind them it prints the whole values.
+_DUPLICATE_KEY = re.compile(r'duplicate key "(.+?)" with value')
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,14 +46,20 @@ class Node:
         try:
             text = path.read_text(encoding="utf-8")
         except (OSError, UnicodeDecodeError) as error:
-            raise FileError(
-                path, None, f"cannot be read ({error}).", "Give a readable Compose file."
-            ) from None
+            raise FileError(path, None, f"cannot be read ({error}).", "Give a readable YAML file.") from None
         try:
             value = YAML(typ="rt").load(text)
         except ReaderError as error:
             line = text.count("\n", 0, error.position) + 1
             raise FileError(path, line, "has a character that YAML does not allow.", "Remove it.") from None
+        except DuplicateKeyError as error:
+            key = _DUPLICATE_KEY.search(error.problem)
+            raise FileError(
+                path,
+                error.problem_mark.line + 1,
+                f"{key[1] if key else 'a key'} stands twice in the same mapping.",
+                "Remove or rename one of them.",
+            ) from None
         except MarkedYAMLError as error:
             place = error.problem_mark.line + 1 if error.problem_mark else None
             raise FileError(path, place, f"is not YAML: {error.problem}.", "Correct the syntax.") from None
@@ -91,6 +100,12 @@ class Node:
         if not re.fullmatch(r"\d+", text, re.ASCII):
             raise self._wrong_type("a whole number")
         return int(text)
+
+    def number(self) -> float:
+        """Return the number, whole or with a fraction."""
+        if isinstance(self.value, int | float) and not isinstance(self.value, bool):
+            return float(self.value)
+        raise self._wrong_type("a number")
 
     def _member(self, key: str | int, title: str) -> Node:
         # A key that came through a merge (`<<: *anchor`) has no place of its own: its mapping gives the line.

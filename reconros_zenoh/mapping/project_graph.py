@@ -1,0 +1,122 @@
+"""The computation graph of a ReconROS project, read from its `build.cfg`."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+from reconros_zenoh.errors import FileError, UsageError
+from reconros_zenoh.mapping.graph import ComputationGraph, Side, Topic
+from reconros_zenoh.ros.names import resolve
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from reconros_zenoh.project.build_cfg import BuildConfiguration, ReconosThread
+    from reconros_zenoh.project.mapping_file import Mapping
+    from reconros_zenoh.project.resource_groups import Resource
+
+OUTSIDE = "(outside)"
+"""The node, in software, that stands for the ends a topic has elsewhere than in the project."""
+
+
+class TopicEnd(NamedTuple):
+    """A rossub or rospub of a project: its topic's full name, and the sides of the threads that use it."""
+
+    resource: Resource
+    node: str
+    topic: str
+    sides: frozenset[Side]
+
+
+def gateway_topics(configuration: BuildConfiguration) -> dict[str, str]:
+    """Return the full name of each gateway's hardware-mapped topic with that of its software-mapped one."""
+    return {
+        _full_name(configuration.path, gateway.line, gateway.hw_topic, "/gateway"): _full_name(
+            configuration.path, gateway.line, gateway.sw_topic, "/gateway"
+        )
+        for gateway in configuration.gateways
+    }
+
+
+def topic_ends(configuration: BuildConfiguration, mapping: Mapping | None = None) -> list[TopicEnd]:
+    """Return all ends of topics in the order of the file; FileError for a name that ROS 2 does not allow.
+
+    A thread is in hardware if `mapping` gives it a slot, without a mapping if it has a hardware source. A
+    group that no thread uses belongs to main.py: software. The hardware-mapped topic of a gateway has the
+    name of its software-mapped one, because both are one topic of the application.
+    """
+    gateways = gateway_topics(configuration)
+    sides: dict[str, set[Side]] = {}
+    for thread in configuration.threads:
+        for group in thread.resource_groups:
+            sides.setdefault(group, set()).add(_side(thread, mapping))
+    ends = []
+    for resource in configuration.resources:
+        if resource.type not in {"rossub", "rospub"}:
+            continue
+        assert resource.node is not None
+        assert resource.ros_name is not None
+        topic = _full_name(configuration.path, resource.line, resource.ros_name, resource.node)
+        if resource.hardware_mapped:
+            topic = gateways.get(topic, topic)
+        used_on = frozenset(sides.get(resource.group, {Side.SOFTWARE}))
+        ends.append(TopicEnd(resource, f"/{resource.node.lstrip('/')}", topic, used_on))
+    return ends
+
+
+def read_project_graph(configuration: BuildConfiguration, mapping: Mapping | None = None) -> ComputationGraph:
+    """Return the graph of all nodes that have topics; see `topic_ends` for what is in hardware.
+
+    A ROS node with callbacks on both sides becomes a node on each. A topic of which the project has only
+    publishers, or only subscribers, has its other ends elsewhere, where nothing is in hardware: the node
+    OUTSIDE stands for them. It also subscribes to a topic that has a gateway and no end in software.
+    """
+    ends = topic_ends(configuration, mapping)
+    sides_of: dict[str, set[Side]] = {}
+    for end in ends:
+        sides_of.setdefault(end.node, set()).update(end.sides)
+    nodes: dict[str, Side] = {}
+    found: dict[str, dict[str, dict[str, None]]] = {}  # names as keys: each once, in the order of the file
+    for end in ends:
+        topic = found.setdefault(end.topic, {"rospub": {}, "rossub": {}})
+        for side in sorted(end.sides):
+            name = end.node if len(sides_of[end.node]) == 1 else f"{end.node} ({side})"
+            nodes[name] = side
+            topic[end.resource.type][name] = None
+    for topic in found.values():
+        for kind in topic:
+            if not topic[kind]:
+                topic[kind][OUTSIDE] = None
+                nodes[OUTSIDE] = Side.SOFTWARE
+    for name in gateway_topics(configuration).values():
+        if name in found and all(nodes[node] is Side.HARDWARE for of in found[name].values() for node in of):
+            found[name]["rossub"][OUTSIDE] = None
+            nodes[OUTSIDE] = Side.SOFTWARE
+    topics = tuple(Topic(name, tuple(of["rospub"]), tuple(of["rossub"])) for name, of in found.items())
+    return ComputationGraph(nodes, topics, _notes(configuration, inner=OUTSIDE not in nodes))
+
+
+def _side(thread: ReconosThread, mapping: Mapping | None) -> Side:
+    in_hardware = thread.hardware is not None if mapping is None else mapping.callbacks[thread.name].slots
+    return Side.HARDWARE if in_hardware else Side.SOFTWARE
+
+
+def _full_name(path: Path, line: int, topic: str, node: str) -> str:
+    namespace, _, base = f"/{node.lstrip('/')}".rpartition("/")
+    try:
+        return resolve(topic, namespace or "/", base)
+    except UsageError as error:
+        raise FileError(path, line, str(error)) from None
+
+
+def _notes(configuration: BuildConfiguration, *, inner: bool) -> tuple[str, ...]:
+    types = {resource.type for resource in configuration.resources}
+    notes = []
+    if types & {"rossrvs", "rossrvc", "rosactions", "rosactionc"}:
+        notes.append("Services and actions are left out: they stay in software.")
+    if not inner:
+        notes.append(
+            f"{OUTSIDE}, in software, stands for ends that the project does not have: clients, other boards."
+        )
+    notes.append("A topic with publishers and subscribers in the project is taken to have no others.")
+    return tuple(notes)

@@ -1,0 +1,114 @@
+"""The computation graph of a project file."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import pytest
+from camera_project import CAMERA, gateway, read
+
+from reconros_zenoh.errors import FileError
+from reconros_zenoh.experiments.roundtrip import application_folder
+from reconros_zenoh.mapping.communication import TopicMapping, map_topics
+from reconros_zenoh.mapping.graph import ComputationGraph, Side, Topic
+from reconros_zenoh.mapping.project_graph import OUTSIDE, read_project_graph
+from reconros_zenoh.project.loader import load_project
+from reconros_zenoh.project.mapping_file import CallbackMapping, Mapping
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+HW, SW = Side.HARDWARE, Side.SOFTWARE
+
+
+def topics(graph: ComputationGraph) -> dict[str, tuple[str, str]]:
+    return {t.name: (" ".join(t.publishers), " ".join(t.subscribers)) for t in graph.topics}
+
+
+def test_nodes_and_topics_have_their_full_names(tmp_path: Path) -> None:
+    graph = read_project_graph(read(tmp_path))
+    assert graph.nodes == {"/edge": HW, "/vision/lane": HW, "/viewer": SW, OUTSIDE: SW}
+    assert topics(graph) == {
+        "/image": (OUTSIDE, "/edge /vision/lane"),
+        "/edges": ("/edge", "/vision/lane"),
+        "/vision/lane/found": ("/vision/lane", "/viewer"),
+    }
+    assert {name: decision.mapping for name, decision in map_topics(graph).items()} == {
+        "/image": TopicMapping.GATEWAY,
+        "/edges": TopicMapping.HARDWARE,
+        "/vision/lane/found": TopicMapping.SOFTWARE,
+    }
+    assert any("Services and actions are left out" in note for note in graph.notes)
+    assert any(OUTSIDE in note for note in graph.notes)
+
+
+def test_what_nobody_in_the_project_reads_leaves_it(tmp_path: Path) -> None:
+    alone = CAMERA[: CAMERA.index("[ResourceGroup@viewer]")] + (
+        "[ReconosThread@lane]\nSlot = slot(1)\nHwSource = hls\nResourceGroup = lane\n"
+    )
+    graph = read_project_graph(read(tmp_path, alone))
+    assert topics(graph)["/vision/lane/found"] == ("/vision/lane", OUTSIDE)
+    # No thread uses the group of /edge: main.py does, in software.
+    assert graph.nodes["/edge"] is SW
+    assert not any("Services" in note for note in graph.notes)
+
+
+def mapping_of(**slots: tuple[int, ...]) -> Mapping:
+    return Mapping(
+        name="test",
+        executor="reconros",
+        software_workers=1,
+        hardware_workers=3,
+        callbacks={name: CallbackMapping(software=not given, slots=given) for name, given in slots.items()},
+    )
+
+
+def test_a_mapping_decides_what_is_in_hardware(tmp_path: Path) -> None:
+    graph = read_project_graph(read(tmp_path), mapping_of(edge=(0,), lane=(), viewer=()))
+    assert (graph.nodes["/edge"], graph.nodes["/vision/lane"]) == (HW, SW)
+    decisions = map_topics(graph)
+    assert {decision.mapping for decision in decisions.values()} == {TopicMapping.SOFTWARE}
+
+
+def test_a_node_with_callbacks_on_both_sides_is_a_node_on_each(tmp_path: Path) -> None:
+    both = CAMERA.replace('"/vision/lane"', '"/edge"').replace("HwSource = hls\nSwSource", "SwSource")
+    graph = read_project_graph(read(tmp_path, both))
+    assert graph.nodes == {"/edge (hardware)": HW, "/edge (software)": SW, "/viewer": SW, OUTSIDE: SW}
+    assert topics(graph)["/edges"] == ("/edge (hardware)", "/edge (software)")
+
+
+def test_the_two_topics_of_a_gateway_are_one(tmp_path: Path) -> None:
+    streamed = CAMERA.replace(
+        'image = rossub, node, image_msg, "/image"\n',
+        'image = rossub, node, sensor_msgs/Image, "/stream", hw\n',
+    )
+    assert topics(
+        read_project_graph(read(tmp_path, streamed + gateway("image", 2, "/stream", "/image")))
+    ) == topics(read_project_graph(read(tmp_path)))
+
+
+def test_a_gateway_has_ends_in_software_even_if_the_project_has_none(tmp_path: Path) -> None:
+    edges = gateway("edges", 2, "/stream", "/edges")
+    assert topics(read_project_graph(read(tmp_path, CAMERA + edges)))["/edges"] == (
+        "/edge",
+        f"/vision/lane {OUTSIDE}",
+    )
+
+
+def test_a_name_that_ros_2_does_not_allow(tmp_path: Path) -> None:
+    with pytest.raises(FileError, match="left arm") as caught:
+        read_project_graph(read(tmp_path, CAMERA.replace('"/edges"', '"/left arm"')))
+    assert caught.value.line == CAMERA[: CAMERA.index('"/edges"')].count("\n") + 1
+
+
+def test_the_shipped_project() -> None:
+    project = load_project(application_folder())
+    graph = read_project_graph(project.configuration, project.mapping("mixed"))
+    assert graph.nodes == {
+        "/inverse_node": HW,
+        "/mnist_node": HW,
+        "/sobel_node": HW,
+        "/hash_node": SW,
+        OUTSIDE: SW,
+    }
+    assert Topic("/image_raw", (OUTSIDE,), ("/sobel_node",)) in graph.topics
