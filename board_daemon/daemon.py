@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from board_daemon.hosting import HostedBoard
 from reconros_zenoh.board.control import ControlServer, claim_name, status
+from reconros_zenoh.board.gateway_control import GatewayServer
 from reconros_zenoh.clock.virtual import succeed_once
 from reconros_zenoh.clock.wall import WallEnvironment, keep_time
 from reconros_zenoh.transport.memory import tune_memory
@@ -45,6 +46,7 @@ def run_board(
         claim_name(transport, options.name)
         hosted = HostedBoard(environment, transport, profile, project, mapping, options)
         control = ControlServer(hosted.board, hosted.executor)
+        gateways = GatewayServer(hosted.board, project.types())
         try:
             on_ready()
             if seconds is not None:
@@ -52,5 +54,6 @@ def run_board(
             environment.run(until=stop)
             return status(hosted.board, hosted.executor)
         finally:
+            gateways.close()
             control.close()
             hosted.close()

@@ -29,6 +29,7 @@ class BoardOptions:
     domain: int = 0
     seed: int = 0
     bitstreams: Path | None = None
+    tap: bool = False
 
 
 class HostedBoard:
@@ -57,6 +58,7 @@ class HostedBoard:
             seed=options.seed,
             threads=threads,
             pointer_bytes=project.pointer_bytes,
+            tap=options.tap,
         )
         self._application = Application(project, self.board, mapping, project.types(), options.bitstreams)
         self.executor: Executor = project.start(self._application)

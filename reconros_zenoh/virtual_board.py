@@ -13,7 +13,7 @@ from reconros_zenoh.board.actions import ActionClientSource, ActionSource
 from reconros_zenoh.board.board import Board, SlotPlan
 from reconros_zenoh.board.clients import ClientSource
 from reconros_zenoh.board.control import status
-from reconros_zenoh.board.endpoints import ServiceSource, SubscriptionSource, TimerSource, TopicWriter
+from reconros_zenoh.board.endpoints import ServiceSource, SubscriptionSource, TimerSource
 from reconros_zenoh.board.executor import Executor
 from reconros_zenoh.board.profile import read_profile
 from reconros_zenoh.clock.virtual import VirtualEnvironment, succeed_once
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from reconros_zenoh.board.endpoints import TopicWriter
     from reconros_zenoh.board.profile import Profile
     from reconros_zenoh.ros.qos import QosProfile
 
@@ -130,13 +131,16 @@ class VirtualBoard(VirtualDesktop):
         )
         self._node = self.board.context.node(self.board.name)
 
-    def subscription(self, topic: str, type_name: str, qos: QosProfile | None = None) -> SubscriptionSource:
-        """Return a subscription of the board."""
-        return SubscriptionSource(self.board, self._node, self.types.message(type_name), topic, qos)
+    def subscription(
+        self, topic: str, type_name: str, qos: QosProfile | None = None, *, in_hardware: bool = False
+    ) -> SubscriptionSource:
+        """Return a subscription of the board; `in_hardware` says that its callback runs in slots."""
+        message_type = self.types.message(type_name)
+        return SubscriptionSource(self.board, self._node, message_type, topic, qos, in_hardware=in_hardware)
 
     def publisher(self, topic: str, type_name: str, qos: QosProfile | None = None) -> TopicWriter:
         """Return a publisher of the board."""
-        return TopicWriter(self.board, self._node, self.types.message(type_name), topic, qos)
+        return self.board.writer(self._node, self.types.message(type_name), topic, qos)
 
     def timer(self, period_ms: float) -> TimerSource:
         """Return a timer of the board."""

@@ -24,6 +24,7 @@ MOST_LINES = 400
 ORDER = (
     ("reconros_zenoh.errors", "reconros_zenoh.toml_file", "reconros_zenoh.yaml_node"),
     ("reconros_zenoh.executor",),
+    ("reconros_zenoh.gateway",),
     ("reconros_zenoh.clock",),
     ("reconros_zenoh.ros",),
     ("reconros_zenoh.transport",),

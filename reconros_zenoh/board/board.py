@@ -9,19 +9,27 @@ from typing import TYPE_CHECKING
 from reconros_zenoh.board.address_space import AddressSpace
 from reconros_zenoh.board.cpu import Cpu
 from reconros_zenoh.board.dds import DdsStack
+from reconros_zenoh.board.endpoints import TopicWriter
+from reconros_zenoh.board.gateway import Gateway
+from reconros_zenoh.board.hmt import HardwareTopic
 from reconros_zenoh.board.host import IN_LINE_NS, Host
+from reconros_zenoh.board.local_topics import LocalTopics, LocalTopicWriter
 from reconros_zenoh.board.memif import Memif
 from reconros_zenoh.board.osif import Osif
 from reconros_zenoh.board.slots import ReconfigurableSlot
 from reconros_zenoh.board.spans import Spans
 from reconros_zenoh.board.zycap import ZyCAP
+from reconros_zenoh.errors import UsageError
+from reconros_zenoh.gateway.filters import Pair, conflict
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from reconros_zenoh.board.profile import Profile
     from reconros_zenoh.clock.virtual import VirtualEnvironment
-    from reconros_zenoh.rmw.node import Context
+    from reconros_zenoh.rmw.node import Context, Node
+    from reconros_zenoh.ros.qos import QosProfile
+    from reconros_zenoh.ros.types import MessageType
 
 
 _ANY_CLOCK_HZ = 1e9
@@ -60,8 +68,12 @@ class Board:
         seed: int = 0,
         threads: int | None = None,
         pointer_bytes: int = 4,
+        tap: bool = False,
     ) -> None:
-        """`threads` run the computations in wall time; None: they run in line, in virtual time."""
+        """`threads` run the computations in wall time; None: they run in line, in virtual time.
+
+        `tap` lets what passes its hardware-mapped topics out into the network, for debugging.
+        """
         model = profile.model
         self.environment = environment
         self.context = context
@@ -77,6 +89,10 @@ class Board:
         # Without a model no event has a time that it could miss.
         self.host = Host(environment, threads, IN_LINE_NS if model else 10 * IN_LINE_NS)
         self.spans = Spans()
+        self.topics = LocalTopics(self, model, model.topics) if model and model.topics else None
+        self.hardware_topics: dict[str, HardwareTopic] = {}
+        self.gateways: list[Gateway] = []
+        self._tap = tap
         self.slots: Mapping[int, ReconfigurableSlot] = {
             plan.slot_id: ReconfigurableSlot(
                 plan.slot_id,
@@ -86,7 +102,54 @@ class Board:
             for plan in slots
         }
 
+    def writer(
+        self,
+        node: Node,
+        message_type: MessageType,
+        topic: str,
+        qos: QosProfile | None = None,
+        *,
+        in_place: bool = False,
+    ) -> TopicWriter:
+        """Return a new publisher on a software-mapped topic; `in_place` as in `LocalTopics.publish`."""
+        if self.topics is None:
+            return TopicWriter(self, node, message_type, topic, qos)
+        return LocalTopicWriter(self, node, message_type, topic, self.topics, qos, in_place=in_place)
+
+    def hardware_topic(self, name: str, message_type: MessageType) -> HardwareTopic:
+        """Return the hardware-mapped topic of that absolute name, the same one each time.
+
+        Raise UsageError when it has another type.
+        """
+        topic = self.hardware_topics.get(name)
+        if topic is None:
+            topic = self.hardware_topics[name] = HardwareTopic(self, name, message_type)
+            if self._tap:
+                topic.open_tap()
+        if topic.type.name != message_type.name:
+            raise UsageError(f"{topic.key} has the type {topic.type.name}, not {message_type.name}.")
+        return topic
+
+    def add_gateway(self, name: str, hmt: str, smt: str, message_type: MessageType) -> Gateway:
+        """Return a new gateway between the topics of these absolute names.
+
+        Raise UsageError when one of them has a gateway already, or another type.
+        """
+        topic = self.hardware_topic(hmt, message_type)
+        taken = conflict(Pair(topic.key, smt), [gateway.pair for gateway in self.gateways])
+        if taken is not None:
+            raise UsageError(
+                f"{taken} has a gateway on board {self.name!r} already: two would send messages round."
+            )
+        gateway = Gateway(self, self.context.node(name), topic, smt)
+        self.gateways.append(gateway)
+        return gateway
+
     def close(self) -> None:
         """Let running computations end; the board does nothing any more."""
+        for gateway in self.gateways:
+            gateway.close()
+        if self.topics is not None:
+            self.topics.close()
         self.zycap.deinit()
         self.host.close()

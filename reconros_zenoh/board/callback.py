@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from reconros_zenoh.board.actions import ActionClientSource
     from reconros_zenoh.board.bitstream import Bitstream
     from reconros_zenoh.board.board import Board
-    from reconros_zenoh.board.endpoints import Event
+    from reconros_zenoh.board.endpoints import Event, MessageWriter
     from reconros_zenoh.board.host import Limit
     from reconros_zenoh.board.slots import ReconfigurableSlot
     from reconros_zenoh.board.software import Outlet
@@ -130,6 +130,7 @@ class HardwareThread(DelegateCalls):
         self._slot = slot
         self._time = implementation.time
         self._limit = implementation.limit
+        self._in_slot = event.in_slot
         self._message = (
             event.message
             if event.message_type is None
@@ -167,7 +168,8 @@ class HardwareThread(DelegateCalls):
         """Return the array once it has come from main memory into the slot: MEM_READ.
 
         The source is an array, such as a field of the message, or an address: then `size` bytes from there on
-        come as numbers of `dtype`. Raises PageFaultError for bytes that are not all in one block of memory.
+        come as numbers of `dtype`. What came over a hardware-mapped topic is in the slot already. Raises
+        PageFaultError for bytes that are not all in one block of memory.
         """
         if isinstance(source, np.ndarray):
             data: Array = source
@@ -175,24 +177,28 @@ class HardwareThread(DelegateCalls):
             assert size is not None
             # What the slot holds does not change with the memory.
             data = self._mapped(int(source), size).view(dtype).copy()
-        yield from self._board.memif.transfer(data.nbytes)
-        self._timeline.mark("memif")
+        if not self._in_slot:
+            yield from self._board.memif.transfer(data.nbytes)
+            self._timeline.mark("memif")
         return data
 
     def mem_write(
-        self, data: Array, to: int | np.integer[Any] | InitData | None = None
+        self, data: Array, to: int | np.integer[Any] | InitData | MessageWriter | None = None
     ) -> Generator[Awaitable, object, None]:
         """Return when the array has gone from the slot to main memory: MEM_WRITE.
 
-        `to` is the address of its first byte; without one it is what the callback publishes or returns next.
-        Raises PageFaultError for bytes that are not all in one block of memory.
+        `to` is the address of its first byte, or the writer that will publish it: for a hardware-mapped topic
+        it stays in the slot. Without `to` it is what the callback returns next. Raises PageFaultError for
+        bytes that are not all in one block of memory.
         """
-        if to is not None:
+        if isinstance(to, (int, np.integer, InitData)):
             content = np.ascontiguousarray(data).reshape(-1).view(np.uint8)
             try:
                 self._board.memory.write(int(to), content)
             except UnmappedError:
                 raise self._page_fault("write", int(to), len(content)) from None
+        elif to is not None and to.in_slot:
+            return
         yield from self._board.memif.transfer(data.nbytes)
         self._timeline.mark("memif")
 
@@ -218,18 +224,19 @@ class HardwareThread(DelegateCalls):
             yield self._environment.timeout(cycles_ns(cycles, self._slot.clock_hz))
             self._timeline.mark("execution")
 
-    def publish(self, writer: Outlet, message: object) -> Generator[Awaitable, object, None]:
-        """Publish the message through the delegate: ROS_PUBLISHER_PUBLISH.
+    def publish(self, writer: MessageWriter, message: object) -> Generator[Awaitable, object, None]:
+        """Publish the message as its topic is mapped: through the delegate, or onto a stream.
 
         The init data is published as it stands in memory, with what the callback has written there.
         """
-        yield from self._call()
-        parts = writer.encode(self._in_memory(message) if isinstance(message, InitData) else message)
-        writer.send(parts, self._timeline.fork())
+        if isinstance(message, InitData):
+            message = self._in_memory(message)
+        yield from writer.publish(message, self._osif, self._timeline)
 
     def call(self, client: Outlet, request: object) -> Generator[Awaitable, object, None]:
         """Call a service through the delegate; its response starts a CLT callback."""
-        return self.publish(client, request)
+        yield from self._call()
+        client.send(client.encode(request), self._timeline.fork())
 
     def send_goal(self, client: ActionClientSource, goal: object) -> Generator[Awaitable, object, bytes]:
         """Send the goal through the delegate and return its id; what becomes of it starts a CLT callback."""

@@ -84,6 +84,11 @@ def status(board: Board, executor: Executor) -> dict[str, Any]:
             }
             for slot in board.slots.values()
         ],
+        "gateways": gateways(board),
+        "hmt": {
+            topic.key: {"passed": topic.passed, "dropped": topic.dropped, "waits": topic.waits}
+            for topic in board.hardware_topics.values()
+        },
         "spans_ms": board.spans.mean_ms(),
         "rejected": dict(board.context.rejections.counts()),
         "host": {
@@ -95,8 +100,34 @@ def status(board: Board, executor: Executor) -> dict[str, Any]:
     }
 
 
+def gateways(board: Board) -> list[dict[str, Any]]:
+    """Return the gateways of a board and what passed them; called by the thread of its event loop.
+
+    `late` messages came between request and cancel; `refused` ones did not fit a FIFO.
+    """
+    return [
+        {
+            "name": gateway.name,
+            "hmt": gateway.pair.hmt,
+            "smt": gateway.pair.smt,
+            "type": gateway.type,
+            "to_hmt": gateway.to_hmt,
+            "to_smt": gateway.to_smt,
+            "late": gateway.late,
+            "dropped": gateway.dropped,
+            "refused": gateway.refused,
+        }
+        for gateway in board.gateways
+    ]
+
+
 def ask_status(transport: Transport, board: str) -> dict[str, Any]:
     """Return the status of the board of that name; raise TransportError when it does not answer."""
+    return ask(transport, board, "status", b"")
+
+
+def ask(transport: Transport, board: str, what: str, question: bytes) -> dict[str, Any]:
+    """Return what the board answers on `reconros/<board>/<what>`; raise TransportError without an answer."""
     found = Event()
     replies: SimpleQueue[Reply | None] = SimpleQueue()
 
@@ -104,10 +135,10 @@ def ask_status(transport: Transport, board: str) -> dict[str, Any]:
         if matching:
             found.set()
 
-    with closing(transport.request(f"reconros/{board}/status", on_matching)) as querier:
+    with closing(transport.request(f"reconros/{board}/{what}", on_matching)) as querier:
         # A session that is just open has not heard of the board yet.
         found.wait(_ANSWER_NS / 1e9)
-        querier.get((b"",), None, replies.put, _ANSWER_NS)
+        querier.get((question,), None, replies.put, _ANSWER_NS)
         reply = replies.get()
     if reply is None or reply.payload is None:
         raise TransportError(
@@ -116,6 +147,6 @@ def ask_status(transport: Transport, board: str) -> dict[str, Any]:
     answer: dict[str, Any] = msgpack.unpackb(reply.payload)
     if answer.get("version") != VERSION:
         raise TransportError(
-            f"board {board!r} speaks version {answer.get('version')} of the status, not {VERSION}."
+            f"board {board!r} speaks version {answer.get('version')} of the {what}, not {VERSION}."
         )
     return answer

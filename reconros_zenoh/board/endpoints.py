@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 from reconros_zenoh.board.spans import Timeline
 from reconros_zenoh.board.stream import Stream
+from reconros_zenoh.errors import BadMessageError
 from reconros_zenoh.ros.qos import QosProfile, Reliability
 
 if TYPE_CHECKING:
@@ -17,7 +18,9 @@ if TYPE_CHECKING:
     import simpy
 
     from reconros_zenoh.board.board import Board
+    from reconros_zenoh.board.osif import Osif
     from reconros_zenoh.clock.activity import Awaitable
+    from reconros_zenoh.gateway.filters import PublisherFilter
     from reconros_zenoh.rmw.node import Node
     from reconros_zenoh.rmw.received import Received, Responder
     from reconros_zenoh.ros.types import MessageType, ServiceType
@@ -28,13 +31,15 @@ if TYPE_CHECKING:
 class Event:
     """What a worker takes: the message of the callback (None for a timer) and its timeline so far.
 
-    `message_type` is None for what has no place in memory as a C struct.
+    `message_type` is None for what has no place in memory as a C struct. `in_slot`: it came over a
+    hardware-mapped topic, so a slot need not read it from main memory.
     """
 
     message: Any
     timeline: Timeline
     responder: Responder | None = None
     message_type: MessageType | None = None
+    in_slot: bool = False
 
 
 class Source(Protocol):
@@ -60,6 +65,34 @@ class Source(Protocol):
         """Pass on what the callback returned."""
 
 
+class MessageWriter(Protocol):
+    """What callbacks publish with, wherever the topic is mapped to."""
+
+    @property
+    def in_slot(self) -> bool:
+        """Whether messages leave the slot without passing main memory."""
+
+    def message(self, **fields: object) -> Any:
+        """Return a message of the topic's type with these fields."""
+
+    def encode(self, message: object) -> Any:
+        """Return what `send` takes; callable from any thread."""
+
+    def send(self, encoded: Any, timeline: Timeline) -> None:
+        """Publish what `encode` returned: the way of a software callback."""
+
+    def publish(self, message: object, osif: Osif, timeline: Timeline) -> Generator[Awaitable, object, None]:
+        """Publish the message: the way of a hardware thread, which goes on when this returns."""
+
+
+class _Incoming(NamedTuple):
+    """A message and its way to the reader's queue, which returns whether it got there."""
+
+    received: Received
+    timeline: Timeline
+    way: Generator[Awaitable, object, bool]
+
+
 class Reader:
     """The queue of messages behind the communication stack: base of subscriptions and service servers.
 
@@ -73,7 +106,7 @@ class Reader:
         self._message_type = message_type
         self._reliable = qos.reliability is Reliability.RELIABLE
         self._queue: deque[Event] = deque(maxlen=depth)
-        self._stream: Stream[tuple[Received, Timeline]] = Stream(self._receive, depth)
+        self._stream: Stream[_Incoming] = Stream(self._receive, depth)
         self._lost = 0
         self._overwritten = 0
         self._on_ready: Callable[[], None] = lambda: None
@@ -109,28 +142,40 @@ class Reader:
 
     def _enter(self, received: Received) -> None:
         environment = self._board.environment
-        self._stream.put((received, Timeline(environment, environment.now - received.transit_ns)))
+        timeline = Timeline(environment, environment.now - received.transit_ns)
+        way = self._board.dds.receive(received.size, received.transit_ns, timeline, reliable=self._reliable)
+        self._stream.put(_Incoming(received, timeline, way))
 
-    def _receive(self, item: tuple[Received, Timeline]) -> Generator[Awaitable, object, None]:
-        received, timeline = item
-        if not (
-            yield from self._board.dds.receive(
-                received.size, received.transit_ns, timeline, reliable=self._reliable
-            )
-        ):
+    def _receive(self, incoming: _Incoming) -> Generator[Awaitable, object, None]:
+        received, timeline, way = incoming
+        if (yield from way):
+            self.enqueue(Event(received.message, timeline, received.responder, self._message_type))
+        else:
             self._lost += 1
-            return
-        self.enqueue(Event(received.message, timeline, received.responder, self._message_type))
 
 
 class SubscriptionSource(Reader):
-    """A subscription: ready while a message waits."""
+    """A subscription: ready while a message waits.
+
+    It discards what `own` does not let pass. `in_hardware` says that its callback runs in slots.
+    """
 
     def __init__(
-        self, board: Board, node: Node, message_type: MessageType, topic: str, qos: QosProfile | None = None
+        self,
+        board: Board,
+        node: Node,
+        message_type: MessageType,
+        topic: str,
+        qos: QosProfile | None = None,
+        *,
+        own: PublisherFilter | None = None,
+        in_hardware: bool = False,
     ) -> None:
         self._qos = qos or QosProfile()
         super().__init__(board, message_type, self._qos)
+        self.in_hardware = in_hardware
+        self._own = own
+        self._check: Callable[[Any], None] | None = None
         self._node = node
         self._type = message_type
         self._topic = topic
@@ -138,7 +183,35 @@ class SubscriptionSource(Reader):
     def open(self, on_ready: Callable[[], None], check: Callable[[Any], None] | None) -> None:
         """Subscribe."""
         self._on_ready = on_ready
-        self._node.subscription(self._type, self._topic, self.arrive, self._qos, check)
+        self._check = check
+        subscription = self._node.subscription(self._type, self._topic, self.arrive, self._qos, check)
+        if self._board.topics is not None:
+            self._board.topics.add_reader(subscription.key, self)
+
+    def arrive(self, received: Received) -> None:
+        """Accept a message from the transport; callable from any thread."""
+        topics = self._board.topics
+        # What this board publishes comes back from the network, too, where somebody else reads it.
+        known = topics is not None and received.publisher in topics.publishers
+        if not known and self._admits(received.publisher):
+            super().arrive(received)
+
+    def deliver(
+        self, received: Received, timeline: Timeline, way: Generator[Awaitable, object, bool]
+    ) -> None:
+        """Accept a message from this board once it has gone its way."""
+        if not self._admits(received.publisher):
+            return
+        try:
+            if self._check is not None:
+                self._check(received.message)
+        except BadMessageError as error:
+            self._board.context.rejections.add(self._topic, received.publisher.hex(), error)
+            return
+        self._stream.put(_Incoming(received, timeline, way))
+
+    def _admits(self, publisher: bytes) -> bool:
+        return self._own is None or self._own.passes(publisher)
 
 
 class ServiceSource(Reader):
@@ -241,12 +314,17 @@ class Writer:
 class TopicWriter:
     """A publisher of the board."""
 
+    in_slot = False
+
     def __init__(
         self, board: Board, node: Node, message_type: MessageType, topic: str, qos: QosProfile | None = None
     ) -> None:
         qos = qos or QosProfile()
         self._writer = Writer(board, qos)
         self._publisher = node.publisher(message_type, topic, qos)
+        self.topic = self._publisher.name
+        self.key = self._publisher.key
+        self.gid = self._publisher.gid
 
     @property
     def dropped(self) -> int:
@@ -261,6 +339,12 @@ class TopicWriter:
         """Return the message as it goes over the wire; callable from any thread."""
         return self._publisher.message_type.encode(message)
 
-    def send(self, parts: Parts, timeline: Timeline) -> None:
+    def send(self, encoded: Parts, timeline: Timeline) -> None:
         """Publish an encoded message."""
-        self._writer.put(parts, timeline, partial(self._publisher.publish_encoded, parts))
+        self._writer.put(encoded, timeline, partial(self._publisher.publish_encoded, encoded))
+
+    def publish(self, message: object, osif: Osif, timeline: Timeline) -> Generator[Awaitable, object, None]:
+        """Publish the message through the delegate: ROS_PUBLISHER_PUBLISH."""
+        yield from osif.call()
+        timeline.mark("osif")
+        self.send(self.encode(message), timeline.fork())

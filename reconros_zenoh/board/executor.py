@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from reconros_zenoh.board.bitstream import Bitstream, read_bitstreams
 from reconros_zenoh.board.callback import HardwareImplementation
+from reconros_zenoh.board.hmt import HmtSource
 from reconros_zenoh.board.host import Limit
 from reconros_zenoh.board.software import SoftwareImplementation
 from reconros_zenoh.board.timing import hardware_time, software_time
@@ -107,6 +108,8 @@ class Executor:
         How long it takes says `timing`, or without it the table of the profile. A call that takes longer than
         `limit_ms` is failed and its worker goes on; what its function still does is not heard of.
         """
+        if isinstance(source, HmtSource):
+            raise UsageError(f"callback {name!r} reads a hardware-mapped topic: it cannot run in software.")
         if not self._software_workers:
             raise UsageError(f"callback {name!r} runs in software, but there are no software workers.")
         time = software_time(self.board.profile, name, timing)

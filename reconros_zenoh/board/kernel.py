@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     import numpy as np
 
     from reconros_zenoh.board.callback import HardwareThread
-    from reconros_zenoh.board.software import Outlet
+    from reconros_zenoh.board.endpoints import MessageWriter
     from reconros_zenoh.clock.activity import Awaitable
 
 
@@ -28,7 +28,7 @@ class Kernel:
     function: Callable[..., np.ndarray[Any, Any]]
     reads: tuple[str, ...]
     answer: Callable[[Any, np.ndarray[Any, Any]], object]
-    publish: Outlet | None = None
+    publish: MessageWriter | None = None
 
     def __call__(self, thread: HardwareThread) -> Generator[Awaitable, object, object]:
         """Run as the callback of a hardware thread."""
@@ -37,7 +37,7 @@ class Kernel:
         for field in fields:
             yield from thread.mem_read(field)
         result = yield from thread.compute(self.function, *fields)
-        yield from thread.mem_write(result)
+        yield from thread.mem_write(result, to=self.publish)
         response = self.answer(message, result)
         if self.publish is None:
             return response

@@ -113,11 +113,13 @@ class MemifSection(_Section):
 
 
 class TopicsSection(_Section):
-    """Software-mapped topics between the nodes of one board (Mapping and Optimizing, Section 4).
+    """Software-mapped topics between nodes of one board.
 
-    A message takes `publish`, then `notify_hardware` for each subscriber in hardware. A software publisher
-    copies it in first (`copy_in`). Between software nodes it takes `notify_software` and `copy_out` for each
-    subscriber in hardware.
+    A publication takes `publish`, and for a software publisher `copy_in` per byte. It then wakes the hardware
+    readers one after another: `notify_hardware` each until they start, of which `notify_software` holds a
+    software publisher and with it the software readers up. A software reader copies what a software publisher
+    wrote at `copy_out` per hardware reader, because they read at the same time, and what a hardware publisher
+    wrote at the speed of the MEMIF.
     """
 
     publish: Duration
@@ -128,13 +130,13 @@ class TopicsSection(_Section):
 
 
 class GatewaySection(_Section):
-    """What a gateway adds: `cancel` takes back its request to the delegate."""
+    """A gateway core: what it takes to `cancel` its request to the delegate, before it can publish."""
 
     cancel: Duration
 
 
 class HmtSection(_Section):
-    """Hardware-mapped topics: a message takes `overhead` and its bytes on the stream."""
+    """The streams of hardware-mapped topics: `overhead` is what a subscriber needs to take a message over."""
 
     overhead: Duration
     bandwidth: Bandwidth

@@ -46,11 +46,12 @@ class Outlet(Protocol):
 class SoftwareContext:
     """What a software callback can do besides computing; it belongs to one call of it, in one thread.
 
-    `log` is the callback's logger.
+    `log` is the callback's logger, `started_ns` the time on the board's clock at which the callback began.
     """
 
     def __init__(self, board: Board, callback: str, time: ExecutionTime) -> None:
         self._board = board
+        self.started_ns = board.environment.now
         # What is measured is really computed each time.
         self._really = time.ns is None and time.modelled
         self._mutexes: dict[Mutex, None] = {}

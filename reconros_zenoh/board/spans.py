@@ -20,6 +20,8 @@ Stage = Literal[
     "execution",  # computing
     "memif",  # memory transfers of a slot
     "blocked",  # waiting for a mailbox, mutex, condition or semaphore
+    "hmt",  # on the stream of a hardware-mapped topic, waiting for room included
+    "gateway",  # in a gateway core: waiting for it, and until its request is cancelled
     "osif",  # calls of a slot through its delegate thread
     "overrun",  # the host was slower than the modelled time
 ]

@@ -99,7 +99,9 @@ class Arrivals:
         environment = self._board.environment
         timeline = Timeline(environment, environment.now - received.transit_ns)
         timeline.callback = self._label
-        self._stream.put(Arrived(*received, timeline))
+        self._stream.put(
+            Arrived(received.message, received.size, received.transit_ns, received.responder, timeline)
+        )
 
     def _receive(self, arrived: Arrived) -> Generator[Awaitable, object, None]:
         yield from self._board.dds.receive(arrived.size, arrived.transit_ns, arrived.timeline)

@@ -63,6 +63,9 @@ def board(
         Path | None,
         typer.Option(help="Folder of `reconros build`.", show_default="bitstreams held in memory"),
     ] = None,
+    tap: Annotated[
+        bool, typer.Option("--tap", help="Let hardware-mapped topics out, as hmt/<board>/<topic>.")
+    ] = False,
 ) -> None:
     """Run an emulated board that hosts a project, until Ctrl-C."""
     from board_daemon.daemon import run_board
@@ -76,7 +79,7 @@ def board(
         read_profile(profile),
         loaded,
         loaded.mapping(mapping),
-        BoardOptions(name, domain, seed, bitstreams),
+        BoardOptions(name, domain, seed, bitstreams, tap),
         lambda: print(
             f"board {name} serves {loaded.configuration.name} under {mapping} on {profile}", flush=True
         ),

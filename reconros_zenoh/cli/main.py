@@ -27,6 +27,7 @@ _VERBS = {
     "new": ("new", "new"),
     "check": ("check", "check"),
     "run": ("run", "run"),
+    "gateway": ("gateway", "gateway"),
     "build": ("build", "build"),
     "map": ("map", "map_communication"),
 }

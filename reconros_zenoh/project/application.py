@@ -8,13 +8,16 @@ import numpy as np
 
 from reconros_zenoh.board.actions import ActionClientSource, ActionSource
 from reconros_zenoh.board.clients import ClientSource
-from reconros_zenoh.board.endpoints import ServiceSource, SubscriptionSource, TimerSource, TopicWriter
+from reconros_zenoh.board.endpoints import ServiceSource, SubscriptionSource, TimerSource
 from reconros_zenoh.board.executor import Executor
+from reconros_zenoh.board.hmt import HmtSource, HmtWriter
 from reconros_zenoh.board.os_resources import Condition, Mailbox, Mutex, Semaphore, SharedMemory
 from reconros_zenoh.board.stack_node import StackNode
 from reconros_zenoh.errors import UsageError
 from reconros_zenoh.executor.callbacks import CallbackKind
+from reconros_zenoh.project.communication import topic_name
 from reconros_zenoh.rmw.parameters import Parameters
+from reconros_zenoh.ros.names import resolve
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -22,7 +25,8 @@ if TYPE_CHECKING:
 
     from reconros_zenoh.board.board import Board
     from reconros_zenoh.board.callback import HardwareCallback
-    from reconros_zenoh.board.endpoints import Source
+    from reconros_zenoh.board.endpoints import MessageWriter, Source
+    from reconros_zenoh.board.hmt import HardwareTopic
     from reconros_zenoh.board.software import SoftwareCallback
     from reconros_zenoh.board.timing import Timing
     from reconros_zenoh.project.loader import Project
@@ -73,17 +77,11 @@ class Application:
         `action_client` returns.
         """
         resource = self._resource(group, name)
-        if qos is not None and resource.type != "rossub":
-            raise UsageError(f"resource {name!r} of group {group!r} is a {resource.type}: its QoS is fixed.")
+        if resource.type != "rossub" or resource.hardware_mapped:
+            _refuse_qos(resource, qos)
         match resource.type:
             case "rossub":
-                return SubscriptionSource(
-                    self.board,
-                    self._node(resource),
-                    self.types.message(_required(resource.interface)),
-                    _required(resource.ros_name),
-                    qos,
-                )
+                return self._subscription(resource, qos)
             case "rossrvs":
                 return ServiceSource(
                     self.board,
@@ -106,6 +104,18 @@ class Application:
                 return TimerSource(self.board, _required(resource.number) * 1_000_000)
         raise UsageError(
             f"resource {name!r} of group {group!r} is a {resource.type}: it makes no callback ready."
+        )
+
+    def _subscription(self, resource: Resource, qos: QosProfile | None) -> Source:
+        if resource.hardware_mapped:
+            return HmtSource(self.board, self._hardware_topic(resource), resource.fifo)
+        return SubscriptionSource(
+            self.board,
+            self._node(resource),
+            self.types.message(_required(resource.interface)),
+            _required(resource.ros_name),
+            qos,
+            in_hardware=self._in_hardware(resource),
         )
 
     def client(self, group: str, name: str) -> ClientSource:
@@ -136,11 +146,13 @@ class Application:
             ),
         )
 
-    def writer(self, group: str, name: str, qos: QosProfile | None = None) -> TopicWriter:
+    def writer(self, group: str, name: str, qos: QosProfile | None = None) -> MessageWriter:
         """Return the publisher of that name; without `qos` reliable, volatile, the last 10."""
         resource = self._resource_of(group, name, "rospub")
-        return TopicWriter(
-            self.board,
+        if resource.hardware_mapped:
+            _refuse_qos(resource, qos)
+            return HmtWriter(self._hardware_topic(resource))
+        return self.board.writer(
             self._node(resource),
             self.types.message(_required(resource.interface)),
             _required(resource.ros_name),
@@ -241,13 +253,20 @@ class Application:
             )
 
     def spin(self, executor: Executor | None = None) -> None:
-        """Start the workers of an executor of one's own or of the one that `register` has filled.
+        """Start the gateways and the workers of an executor of one's own or of the one `register` has filled.
 
         It is the one that the board reports on.
         """
         self.executor = executor or self._mapped
         if self.executor is None:
             raise UsageError("app.spin() without a callback. Call app.register(...) first.")
+        for gateway in self.project.configuration.gateways:
+            self.board.add_gateway(
+                gateway.name,
+                resolve(gateway.hw_topic, "/", gateway.name),
+                resolve(gateway.sw_topic, "/", gateway.name),
+                self.types.message(gateway.type),
+            )
         self.executor.spin()
 
     def close(self) -> None:
@@ -282,6 +301,19 @@ class Application:
                 f"It has {known}."
             ) from None
 
+    def _in_hardware(self, resource: Resource) -> bool:
+        """Tell whether a callback that uses the resource may run in a slot."""
+        return any(
+            self.mapping.callbacks[thread.name].slots
+            for thread in self.project.configuration.threads
+            if resource.group in thread.resource_groups
+        )
+
+    def _hardware_topic(self, resource: Resource) -> HardwareTopic:
+        return self.board.hardware_topic(
+            topic_name(resource), self.types.message(_required(resource.interface))
+        )
+
     def _node(self, resource: Resource) -> Node:
         return self._node_named(_required(resource.node))
 
@@ -290,6 +322,14 @@ class Application:
             namespace, _, base = name.rpartition("/")
             self._nodes[name] = self.board.context.node(base, namespace or "/")
         return self._nodes[name]
+
+
+def _refuse_qos(resource: Resource, qos: QosProfile | None) -> None:
+    if qos is not None:
+        kind = "hardware-mapped topic" if resource.hardware_mapped else resource.type
+        raise UsageError(
+            f"resource {resource.name!r} of group {resource.group!r} is a {kind}: its QoS is fixed."
+        )
 
 
 def _required(value: T | None) -> T:

@@ -10,6 +10,7 @@ from reconros_zenoh.board.bitstream import Bitstream
 from reconros_zenoh.board.board import SlotPlan
 from reconros_zenoh.errors import FileError, UsageError
 from reconros_zenoh.project.build_cfg import read_build_cfg
+from reconros_zenoh.project.communication import check_places, check_topics
 from reconros_zenoh.project.interfaces import read_interfaces
 from reconros_zenoh.project.main_file import load_main, running_project
 from reconros_zenoh.project.mapping_file import Mapping, bitstream_slots, read_mapping
@@ -114,11 +115,13 @@ class Project:
             if not shipped:
                 return Mapping.default(self.configuration)
             name_or_file = next(iter(shipped))
-        return read_mapping(
+        mapping = read_mapping(
             self.mapping_path(name_or_file),
             bitstream_slots(self.configuration),
             [slot.slot_id for slot in self.slots],
         )
+        check_places(self.configuration, mapping.callbacks)
+        return mapping
 
     def mapping_path(self, name_or_file: str) -> Path:
         """Return where the mapping stands; raise UsageError when there is none of that name."""
@@ -148,6 +151,7 @@ class Project:
 def load_project(folder: Path) -> Project:
     """Return the project in a folder; raise FileError for what is missing or wrong in it."""
     configuration = read_build_cfg(folder / "build.cfg")
+    check_topics(configuration)
     interfaces = read_interfaces(folder)
     return Project(folder, configuration, interfaces, load_main(folder, configuration.name))
 

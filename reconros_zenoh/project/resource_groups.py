@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, cast
 
+from reconros_zenoh.board.hmt import FIFO_DEPTH, FifoPlan
 from reconros_zenoh.project.type_names import inline_message_type, ros_type_name
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
+    from reconros_zenoh.board.hmt import Policy
     from reconros_zenoh.project.ini import Option, Section
 
 # The arguments of each resource type: a resource type stands for a reference to one, `[...]` may be missing.
@@ -32,9 +34,13 @@ _ARGUMENTS = {
     "cond": ("mutex",),
     "sem": ("value",),
 }
-_HARDWARE_MAPPED = ("rosnode", "pkg/Type", "topic", "hw")
+_HARDWARE_MAPPED = {
+    "rossub": ("rosnode", "pkg/Type", "topic", "hw", "[depth]", "[block|drop]", "[message_bytes]"),
+    "rospub": ("rosnode", "pkg/Type", "topic", "hw", "[message_bytes]"),
+}
 _INTERFACES = ("rosmsg", "rossrvmsg", "rosactionmsg")
 _ROS_NAMES = ("name", "topic", "service", "action name")
+_FIFO_NUMBERS = ("depth", "message_bytes")
 _NUMBERS = ("poll_us", "period_ms", "words", "size", "value")
 # Listing 1 of ReconROS Executor, Section IV, prints this one.
 _MISPRINTS = {"rosmmsg": "rosmsg"}
@@ -50,7 +56,8 @@ class Resource:
     belongs to, `interface` its type ("sensor_msgs/msg/Image"), `ros_name` the name of the node, topic,
     service or action as written. `number` is the period [ms] of a rostmr, the poll interval [us] of a rossub,
     service or action, the words of a mem, the size of an mbox or the start value of a sem.
-    `hardware_mapped` is true for a topic that stays in the FPGA.
+    `hardware_mapped` is true for a topic that stays in the FPGA; then `fifo` is what a rossub declares of its
+    FIFO, or how large the messages of a rospub can be.
     """
 
     group: str
@@ -63,6 +70,7 @@ class Resource:
     ros_name: str | None = None
     number: int | None = None
     hardware_mapped: bool = False
+    fifo: FifoPlan = field(default_factory=FifoPlan)
 
 
 @dataclass(frozen=True)
@@ -142,8 +150,8 @@ def _declaration(group: str, number: str | None, option: Option, warnings: list[
         position = match.end()
     args = tuple(tokens[1:])
     arguments = _ARGUMENTS[resource_type]
-    if resource_type in {"rossub", "rospub"} and args[-1:] == ("hw",):
-        arguments = _HARDWARE_MAPPED
+    if resource_type in _HARDWARE_MAPPED and args[3:4] == ("hw",):
+        arguments = _HARDWARE_MAPPED[resource_type]
     required = sum(not argument.startswith("[") for argument in arguments)
     kind_differs = resource_type in _INTERFACES and args[1:2] != arguments[1:2]
     if not required <= len(args) <= len(arguments) or kind_differs:
@@ -192,6 +200,7 @@ def _resource(
         ros_name=ros_name,
         number=number,
         hardware_mapped="hw" in declaration.arguments,
+        fifo=_fifo(declaration),
     )
 
 
@@ -206,6 +215,21 @@ def _number(declaration: _Declaration, argument: str, text: str) -> int:
             f"{argument} of {declaration.name} is {text!r}, not a number.", "Write a whole number."
         )
     return int(text)
+
+
+def _fifo(declaration: _Declaration) -> FifoPlan:
+    """Return the FIFO that a hardware-mapped end declares, else the plain one."""
+    texts = dict(zip(declaration.arguments, declaration.args, strict=False))
+    policy = texts.get("block|drop", "block")
+    if policy not in ("block", "drop"):
+        raise declaration.option.error(
+            f"{declaration.name} says {policy!r} about a full FIFO.", "Write `block` or `drop`."
+        )
+    numbers = {name: _number(declaration, name, texts[name]) for name in _FIFO_NUMBERS if name in texts}
+    for name, number in numbers.items():
+        if not number:
+            raise declaration.option.error(f"{name} of {declaration.name} is 0.", "Write 1 or more.")
+    return FifoPlan(numbers.get("depth", FIFO_DEPTH), cast("Policy", policy), numbers.get("message_bytes"))
 
 
 def _find(

@@ -39,7 +39,7 @@ class Endpoint:
             interface.type_hash,
             qos,
         ).format()
-        self._gid = gid(self._token_key)
+        self.gid = gid(self._token_key)
         self._sequence_numbers = itertools.count(1)
 
     def announce(self) -> None:
@@ -52,4 +52,4 @@ class Endpoint:
 
     def next_attachment(self) -> bytes:
         """Return the attachment of the endpoint's next message, stamped now."""
-        return Attachment(next(self._sequence_numbers), self.context.clock_ns(), self._gid).encode()
+        return Attachment(next(self._sequence_numbers), self.context.clock_ns(), self.gid).encode()

@@ -22,10 +22,12 @@ class Received(NamedTuple):
     """A decoded message, the bytes it had on the wire, and how long it was on its way.
 
     `transit_ns` is the present time of the context's clock minus the source timestamp: between hosts it is
-    only as good as their clocks agree. `responder` is None but for a request.
+    only as good as their clocks agree. `responder` is None but for a request, `publisher` is the gid of the
+    publisher of a message.
     """
 
     message: Any
     size: int
     transit_ns: int
     responder: Responder | None = None
+    publisher: bytes = b""

@@ -67,7 +67,7 @@ class Subscription(Endpoint):
             self.context.rejections.add(sample.key, sender.hex() if sender else None, error)
             return
         transit_ns = self.context.clock_ns() - attachment.source_timestamp_ns
-        self._sink(Received(message, len(payload), transit_ns))
+        self._sink(Received(message, len(payload), transit_ns, publisher=attachment.gid))
 
 
 def _foreign(key: str, own: str) -> BadMessageError:

@@ -59,8 +59,14 @@ def small_profile(
     link_byte_ns: float = 0,
     icap_offset_ns: int = 0,
     osif_ns: int = 0,
+    hmt_overhead_ns: int = 0,
+    cancel_ns: int = 0,
+    topics: Mapping[str, float] | None = None,
 ) -> Profile:
-    """`callbacks` gives each name its time in software and what its slot computes; the MEMIF moves 1 B/ns."""
+    """`callbacks` gives each name its time in software and what its slot computes; the MEMIF moves 1 B/ns.
+
+    A hardware-mapped topic moves 1 B/ns, too. `topics` are the constants of topics inside the board.
+    """
 
     def of(value: float, unit: str) -> dict[str, object]:
         return {"value": value, "unit": unit, "basis": "assumed"}
@@ -100,6 +106,13 @@ def small_profile(
             for name, (software_ns, compute_ns) in (callbacks or {}).items()
         },
     }
+    model["hmt"] = {"overhead": of(hmt_overhead_ns, "ns"), "bandwidth": of(1, "GB/s")}
+    model["gateway"] = {"cancel": of(cancel_ns, "ns")}
+    if topics is not None:
+        model["topics"] = {
+            name: of(topics.get(name, 0), "ns/B" if name.startswith("copy") else "ns")
+            for name in ("publish", "notify_hardware", "notify_software", "copy_in", "copy_out")
+        }
     return Profile.model_validate({"name": "small", "description": "", "model": model})
 
 
@@ -124,12 +137,19 @@ def small_board(
     environment: VirtualEnvironment | None = None,
     threads: int | None = None,
     pointer_bytes: int = 4,
+    network: SimulatedNetwork | None = None,
+    name: str = "board0",
 ) -> Board:
-    """A board in a network of its own."""
-    environment = environment or VirtualEnvironment()
-    context = Context(SimulatedNetwork(environment).transport("b0"), 0, environment.clock_ns)
+    """A board in a network of its own, or in this one."""
+    if network is None:
+        network = SimulatedNetwork(environment or VirtualEnvironment())
+    environment = network.environment
+    session = f"b{name.removeprefix('board')}"
+    context = Context(network.transport(session), 0, environment.clock_ns)
     plans = tuple(SlotPlan(slot, 100, 0, 0) for slot in range(slots))
-    return Board(environment, context, profile, plans, threads=threads, pointer_bytes=pointer_bytes)
+    return Board(
+        environment, context, profile, plans, threads=threads, name=name, pointer_bytes=pointer_bytes
+    )
 
 
 def desktop(board: Board) -> Context:

@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 MINIITX = (resources.files("reconros_zenoh.board") / "profiles" / "miniitx-zynq7100.toml").read_text("utf-8")
 
 
-def test_two_profiles_ship() -> None:
-    assert profile_names() == ["miniitx-zynq7100", "native"]
+def test_three_profiles_ship() -> None:
+    assert profile_names() == ["miniitx-zynq7100", "native", "zcu104"]
 
 
 @pytest.mark.parametrize("name", profile_names())
@@ -92,7 +92,7 @@ def test_an_unknown_name_lists_those_there_are() -> None:
     with pytest.raises(UsageError) as caught:
         read_profile("zynq7000")
     assert str(caught.value) == (
-        "no profile named 'zynq7000'. Give one of miniitx-zynq7100, native or a .toml file."
+        "no profile named 'zynq7000'. Give one of miniitx-zynq7100, native, zcu104 or a .toml file."
     )
 
 

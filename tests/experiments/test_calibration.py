@@ -34,8 +34,9 @@ MNIST_IN_SOFTWARE = ("model", "callbacks", "mnist", "software")  # which the map
 def fitting_only(path: Path, *places: tuple[str, ...]) -> Path:
     """Write the shipped profile without chance, with these constants calibrated and all others assumed."""
     text = MINIITX.replace('"calibrated"', '"assumed"')
-    # With nothing left to chance a few requests are enough.
-    for name in ("poll_jitter", "jitter", "nack_probability", "loss_probability", "loss_probability_busy"):
+    # With nothing left to chance, and no poll grid, a few requests are enough.
+    polls = ("hardware_poll", "software_poll", "poll_jitter")
+    for name in (*polls, "jitter", "nack_probability", "loss_probability", "loss_probability_busy"):
         text = re.sub(rf"^{name} = {{ value = [0-9.]+", f"{name} = {{ value = 0", text, flags=re.MULTILINE)
     path.write_text(text)
     lines = path.read_text().splitlines(keepends=True)

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from reconros_zenoh.board.callback import HardwareThread
-    from reconros_zenoh.board.endpoints import TopicWriter
+    from reconros_zenoh.board.endpoints import MessageWriter
     from reconros_zenoh.board.software import SoftwareContext
     from reconros_zenoh.clock.activity import Awaitable
     from reconros_zenoh.ros.types import MessageType
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 class Hash:
     """Publishes std_msgs/UInt32MultiArray with 8 elements each time the timer expires."""
 
-    def __init__(self, publisher: TopicWriter, layout: MessageType) -> None:
+    def __init__(self, publisher: MessageWriter, layout: MessageType) -> None:
         """`layout` is std_msgs/MultiArrayLayout."""
         self._publisher = publisher
         self._layout = layout.cls(dim=[], data_offset=0)
@@ -39,7 +39,7 @@ class Hash:
         yield from thread.get_init_data()
         ram = yield from thread.mem_read(source())
         digest = yield from thread.compute(sha256, ram)
-        yield from thread.mem_write(digest)
+        yield from thread.mem_write(digest, to=self._publisher)
         yield from thread.publish(self._publisher, self._answer(digest))
 
     def _answer(self, digest: NDArray[np.uint32]) -> Any:

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from collections.abc import Generator
 
     from reconros_zenoh.board.callback import HardwareThread
-    from reconros_zenoh.board.endpoints import TopicWriter
+    from reconros_zenoh.board.endpoints import MessageWriter
     from reconros_zenoh.board.software import SoftwareContext
     from reconros_zenoh.clock.activity import Awaitable
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 class Inverse:
     """Subscribes to std_msgs/UInt32, publishes std_msgs/UInt32."""
 
-    def __init__(self, publisher: TopicWriter) -> None:
+    def __init__(self, publisher: MessageWriter) -> None:
         self._publisher = publisher
 
     def check(self, message: Any) -> None:
@@ -40,5 +40,5 @@ class Inverse:
         message = yield from thread.get_init_data()
         ram = yield from thread.mem_read(np.array([message.data], np.uint32))
         word = yield from thread.compute(inverse_kinematics, int(ram[0]))
-        yield from thread.mem_write(np.array([word], np.uint32))
+        yield from thread.mem_write(np.array([word], np.uint32), to=self._publisher)
         yield from thread.publish(self._publisher, self._publisher.message(data=word))

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from collections.abc import Generator
 
     from reconros_zenoh.board.callback import HardwareThread
-    from reconros_zenoh.board.endpoints import TopicWriter
+    from reconros_zenoh.board.endpoints import MessageWriter
     from reconros_zenoh.board.software import SoftwareContext
     from reconros_zenoh.clock.activity import Awaitable
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 class Mnist:
     """Subscribes to sensor_msgs/Image (mono8, 28 x 28), publishes std_msgs/UInt32."""
 
-    def __init__(self, publisher: TopicWriter) -> None:
+    def __init__(self, publisher: MessageWriter) -> None:
         self._publisher = publisher
         self._classify = shipped_classifier().classify
 
@@ -39,5 +39,5 @@ class Mnist:
         message = yield from thread.get_init_data()
         ram = yield from thread.mem_read(message.data)
         digit = yield from thread.compute(self._classify, ram.reshape(SIDE, SIDE))
-        yield from thread.mem_write(np.array([digit], np.uint32))
+        yield from thread.mem_write(np.array([digit], np.uint32), to=self._publisher)
         yield from thread.publish(self._publisher, self._publisher.message(data=digit))

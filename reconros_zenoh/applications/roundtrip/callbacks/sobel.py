@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from reconros_zenoh.board.callback import HardwareThread
-    from reconros_zenoh.board.endpoints import TopicWriter
+    from reconros_zenoh.board.endpoints import MessageWriter
     from reconros_zenoh.board.software import SoftwareContext
     from reconros_zenoh.clock.activity import Awaitable
 
@@ -24,7 +24,7 @@ HEIGHT, WIDTH, CHANNELS = SHAPE
 class Sobel:
     """Subscribes to sensor_msgs/Image, publishes sensor_msgs/Image: bgr8, 640 x 480."""
 
-    def __init__(self, publisher: TopicWriter) -> None:
+    def __init__(self, publisher: MessageWriter) -> None:
         self._publisher = publisher
 
     def check(self, message: Any) -> None:
@@ -41,7 +41,7 @@ class Sobel:
         message = yield from thread.get_init_data()
         ram = yield from thread.mem_read(message.data)
         edges = yield from thread.compute(sobel, ram.reshape(SHAPE))
-        yield from thread.mem_write(edges)
+        yield from thread.mem_write(edges, to=self._publisher)
         yield from thread.publish(self._publisher, self._answer(message, edges))
 
     def _answer(self, message: Any, edges: NDArray[np.uint8]) -> Any:

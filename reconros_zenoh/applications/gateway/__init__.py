@@ -1,0 +1,1 @@
+"""The synthetic setup of the gateways paper: a topic in software, and the same with a gateway."""

@@ -1,0 +1,1 @@
+"""A ReconROS project folder."""

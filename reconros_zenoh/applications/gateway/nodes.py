@@ -1,0 +1,152 @@
+"""The nodes of Fig. 5: one publishes images of random data, the others copy them and check what they got.
+
+The same kernels run on a software-mapped topic, a hardware-mapped one, and with a gateway between. An image
+carries the time of its publication as its stamp, and publisher, number and CRC-32 as its frame id.
+Source: Gateways, Section 4.
+"""
+
+from __future__ import annotations
+
+import zlib
+from collections import defaultdict
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from reconros_zenoh.board.executor import Executor
+from reconros_zenoh.executor.callbacks import CallbackKind
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Generator
+    from typing import TypeAlias
+
+    from numpy.typing import NDArray
+
+    from reconros_zenoh.board.callback import HardwareThread
+    from reconros_zenoh.board.endpoints import MessageWriter, Source
+    from reconros_zenoh.board.software import SoftwareContext
+    from reconros_zenoh.clock.activity import Awaitable
+    from reconros_zenoh.clock.virtual import VirtualEnvironment
+    from reconros_zenoh.project.application import Application
+    from reconros_zenoh.ros.types import TypeRegistry
+
+    OnReceived: TypeAlias = Callable[[str, int, int], None]
+    """Gets a subscriber's name, the number of an image that it has copied, and the transmission time [ns]."""
+
+SUBSCRIBERS = 8
+_S = 1_000_000_000
+
+
+class Publisher:
+    """Publishes an image of random data whenever it is called."""
+
+    def __init__(
+        self,
+        name: str,
+        writer: MessageWriter,
+        types: TypeRegistry,
+        environment: VirtualEnvironment,
+        body: NDArray[np.uint8],
+    ) -> None:
+        self._name = name
+        self._writer = writer
+        self._header = types.message("std_msgs/msg/Header").cls
+        self._time = types.message("builtin_interfaces/msg/Time").cls
+        self._environment = environment
+        self._body = body
+        self._crc = zlib.crc32(body.data)
+        self._number = 0
+
+    def software(self, _: object, context: SoftwareContext) -> None:
+        """Publish the next image."""
+        context.publish(self._writer, self._image(context.started_ns))
+
+    def hardware(self, thread: HardwareThread) -> Generator[Awaitable, object, None]:
+        """Publish the next image."""
+        yield from thread.mem_write(self._body, to=self._writer)
+        yield from thread.publish(self._writer, self._image(self._environment.now))
+
+    def _image(self, now_ns: int) -> Any:
+        self._number += 1
+        seconds, nanoseconds = divmod(now_ns, _S)
+        return self._writer.message(
+            header=self._header(
+                stamp=self._time(sec=seconds, nanosec=nanoseconds),
+                frame_id=f"{self._name} {self._number} {self._crc:08x}",
+            ),
+            height=1,
+            width=len(self._body),
+            encoding="mono8",
+            is_bigendian=0,
+            step=len(self._body),
+            data=self._body,
+        )
+
+
+class Subscriber:
+    """Copies each image into its memory and checks its number and its CRC."""
+
+    def __init__(self, environment: VirtualEnvironment, on_received: Callable[[int, int], None]) -> None:
+        self._environment = environment
+        self._on_received = on_received
+        self._expected: defaultdict[str, int] = defaultdict(lambda: 1)
+
+    def software(self, image: Any, context: SoftwareContext) -> None:
+        """Note and check the image; the copy was made before."""
+        self._check(image, context.started_ns, context.compute(zlib.crc32, image.data))
+
+    def hardware(self, thread: HardwareThread) -> Generator[Awaitable, object, None]:
+        """Copy the image, note and check it."""
+        image = yield from thread.get_init_data()
+        ram = yield from thread.mem_read(image.data)
+        now_ns = self._environment.now
+        self._check(image, now_ns, (yield from thread.compute(zlib.crc32, ram)))
+
+    def _check(self, image: Any, now_ns: int, crc: int) -> None:
+        publisher, number, wanted_crc = image.header.frame_id.split()
+        expected = self._expected[publisher]
+        if int(number) != expected or crc != int(wanted_crc, 16):
+            raise ValueError(f"got image {number} with CRC {crc:08x}, not {expected} with {wanted_crc}")
+        self._expected[publisher] += 1
+        sent_ns = image.header.stamp.sec * _S + image.header.stamp.nanosec
+        self._on_received(int(number), now_ns - sent_ns)
+
+
+def random_body(size: int) -> NDArray[np.uint8]:
+    """Return `size` random bytes, the same ones each time; nobody can change them."""
+    body = np.random.default_rng(size).integers(0, 256, size, np.uint8)
+    body.setflags(write=False)
+    return body
+
+
+def run_nodes(
+    app: Application,
+    body: NDArray[np.uint8] | None = None,
+    trigger: Source | None = None,
+    on_received: OnReceived = lambda *_: None,
+) -> None:
+    """Run each node that has a place; publishers publish `body` (100 kB) at each `trigger` (a second)."""
+    environment, mapping = app.board.environment, app.mapping
+    executor = Executor(app.board, mapping.software_workers, mapping.hardware_workers, app.bitstreams)
+    for name, place in mapping.callbacks.items():
+        if not (place.software or place.slots):
+            continue
+        callback: Publisher | Subscriber
+        if name.startswith("publisher"):
+            kind, source = CallbackKind.TMR, trigger or app.source(name, "tmr")
+            callback = Publisher(
+                name,
+                app.writer(name, "pub"),
+                app.types,
+                environment,
+                random_body(100_000) if body is None else body,
+            )
+        else:
+            kind, source = CallbackKind.SUB, app.source(name, "sub")
+            callback = Subscriber(environment, partial(on_received, name))
+        if place.software:
+            executor.add_sw_callback(name, kind, source, callback.software)
+        if place.slots:
+            executor.add_hw_callback(name, place.slots, kind, source, callback.hardware)
+    app.spin(executor)

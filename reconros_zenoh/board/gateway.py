@@ -1,0 +1,136 @@
+"""A gateway on a board: the core of `reconros_zenoh.gateway` in the model, with its delegate and its ends."""
+
+from __future__ import annotations
+
+import logging
+from typing import TYPE_CHECKING, Any
+
+from reconros_zenoh.board.endpoints import SubscriptionSource
+from reconros_zenoh.board.hmt import Fifo, FifoPlan
+from reconros_zenoh.clock.activity import Activity, Signal
+from reconros_zenoh.errors import UsageError
+from reconros_zenoh.gateway import core
+from reconros_zenoh.gateway.filters import Pair, PublisherFilter
+
+if TYPE_CHECKING:
+    from collections.abc import Generator
+
+    from reconros_zenoh.board.board import Board
+    from reconros_zenoh.board.endpoints import Event
+    from reconros_zenoh.board.hmt import HardwareTopic
+    from reconros_zenoh.clock.activity import Awaitable
+    from reconros_zenoh.rmw.node import Node
+
+_log = logging.getLogger(__name__)
+
+
+class Gateway:
+    """Keeps a software-mapped and a hardware-mapped topic of one name each alike, until it is closed.
+
+    Whatever the number of subscribers, a message crosses the MEMIF once. Towards the HMT it is read from
+    memory and streamed at the same time; from the HMT it is written as its words come in. Source: Gateways,
+    Section 3.
+    """
+
+    def __init__(self, board: Board, node: Node, topic: HardwareTopic, smt: str) -> None:
+        model = board.profile.model
+        if model is not None and model.gateway is None:
+            raise UsageError(
+                f"profile {board.profile.name!r} has no times for a gateway. Add a section [model.gateway] "
+                "to a copy of the profile, or use the profile zcu104 or native."
+            )
+        self._board = board
+        self._node = node
+        self._topic = topic
+        self._cancel_ns = model.gateway.cancel.ns if model and model.gateway else 0
+        self._woken = Signal()
+        self._smt_last = False
+        self._writer = board.writer(node, topic.type, smt, in_place=True)
+        self._smt = SubscriptionSource(
+            board, node, topic.type, smt, own=PublisherFilter(self._writer.gid), in_hardware=True
+        )
+        self._hmt = Fifo(FifoPlan(), self._wake, PublisherFilter(self), cut_through=True)
+        self.name = node.name
+        self.pair = Pair(topic.key, self._writer.topic)
+        self.type = topic.type.name
+        self.to_hmt = 0
+        self.to_smt = 0
+        self.late = 0
+        self.refused = 0
+        topic.subscribe(self._hmt)
+        self._smt.open(self._wake, None)
+        Activity(self._run())
+
+    @property
+    def dropped(self) -> int:
+        """How many messages were pushed out by newer ones, on their way in from the SMT or out to it."""
+        return self._smt.dropped + self._writer.dropped
+
+    def close(self) -> None:
+        """Take the gateway out of the graph and off its stream."""
+        self._topic.unsubscribe(self._hmt)
+        self._node.close()
+
+    def _wake(self) -> None:
+        woken, self._woken = self._woken, Signal()
+        woken.fire()
+
+    def _run(self) -> Generator[Awaitable, object, None]:
+        state, action = core.step(core.State(), core.Started())
+        while True:
+            event = yield from self._carry_out(action)
+            state, action = core.step(state, event)
+
+    def _carry_out(self, action: core.Action) -> Generator[Awaitable, object, core.Event]:
+        """Return what comes of the action; of a request, the first thing that the core then polls."""
+        match action:
+            case core.Request():
+                yield from self._board.osif.call()
+                return (yield from self._poll())
+            case core.WriteHmt(event):
+                yield from self._write_hmt(event)
+                return core.Transferred()
+            case core.WriteMemory(streamed):
+                yield from self._board.memif.transfer(streamed.size)
+                if streamed.complete.callbacks is not None:
+                    yield streamed.complete
+                streamed.timeline.mark("hmt")
+                return core.Transferred()
+            case core.Cancel():
+                yield from self._board.cpu.run(self._cancel_ns)
+                late = self._smt.take() if self._smt.is_ready() else None
+                self.late += late is not None
+                return core.Cancelled(late)
+            case core.Publish(streamed):
+                streamed.timeline.mark("gateway")
+                self.to_smt += 1
+                yield from self._writer.publish(streamed.message, self._board.osif, streamed.timeline)
+                return core.Published()
+
+    def _poll(self) -> Generator[Awaitable, object, core.Event]:
+        """Return what has come; when both sides have a message, they take turns."""
+        while not (self._smt.is_ready() or self._hmt.messages):
+            yield self._woken
+        self._smt_last = self._smt.is_ready() and not (self._hmt.messages and self._smt_last)
+        if self._smt_last:
+            return core.Responded(self._smt.take())
+        streamed = self._hmt.take()
+        return core.Arrived(streamed._replace(timeline=streamed.timeline.fork()))
+
+    def _write_hmt(self, event: Event) -> Generator[Awaitable, object, None]:
+        message, timeline = event.message, event.timeline
+        timeline.mark("gateway")
+        read = Signal()
+        Activity(self._read(message, read))
+        try:
+            yield from self._topic.publish(self, message, timeline)
+            self.to_hmt += 1
+        except UsageError as error:
+            self.refused += 1
+            _log.warning("gateway %s: %s", self.name, error)
+        if read.callbacks is not None:
+            yield read
+
+    def _read(self, message: Any, done: Signal) -> Generator[Awaitable, object, None]:
+        yield from self._board.memif.transfer(self._topic.size(message))
+        done.fire()

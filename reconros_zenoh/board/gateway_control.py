@@ -1,0 +1,80 @@
+"""Declaring gateways on a running board: `reconros/<board>/gateway`, msgpack, versioned."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import msgpack
+
+from reconros_zenoh.board.control import VERSION, ask, gateways
+from reconros_zenoh.errors import UsageError
+from reconros_zenoh.ros.graph import EndpointToken, parse, tokens_expression
+from reconros_zenoh.ros.names import dds_type_name
+
+if TYPE_CHECKING:
+    from reconros_zenoh.board.board import Board
+    from reconros_zenoh.ros.types import TypeRegistry
+    from reconros_zenoh.transport.base import Request, Transport
+
+_LOOK_NS = 1_000_000_000
+
+
+class GatewayServer:
+    """Answers `reconros/<board>/gateway` with the gateways, after adding the one that the request has."""
+
+    def __init__(self, board: Board, types: TypeRegistry) -> None:
+        self._board = board
+        self._types = types
+        self._declaration = board.context.transport.serve(f"reconros/{board.name}/gateway", self._on_request)
+
+    def close(self) -> None:
+        """Withdraw the queryable."""
+        self._declaration.close()
+
+    def _on_request(self, request: Request) -> None:
+        # The board's state belongs to the thread of its event loop.
+        self._board.environment.post(self._reply, request)
+
+    def _reply(self, request: Request) -> None:
+        refused = None
+        try:
+            self._add(request.read())
+        except UsageError as error:
+            refused = str(error)
+        except (ValueError, KeyError, TypeError) as error:
+            refused = f"no request: {error!r}"
+        answer = {"version": VERSION, "gateways": gateways(self._board), "refused": refused}
+        request.reply((msgpack.packb(answer),), None)
+
+    def _add(self, payload: memoryview) -> None:
+        question = msgpack.unpackb(payload)
+        if question["version"] != VERSION:
+            raise UsageError(f"board {self._board.name!r} speaks version {VERSION} of the gateway.")
+        wanted = question.get("add")
+        if wanted is not None:
+            message_type = self._types.message(wanted["type"])
+            self._board.add_gateway(wanted["name"], wanted["hmt"], wanted["smt"], message_type)
+
+
+def ask_gateways(transport: Transport, board: str, add: dict[str, str] | None = None) -> list[dict[str, Any]]:
+    """Return the gateways of the board of that name.
+
+    `add` is one to be declared first: its `name`, the absolute topic names `hmt` and `smt`, and its `type`
+    (`sensor_msgs/msg/Image`). Raise UsageError when the board refuses it.
+    """
+    question = {"version": VERSION, **({"add": add} if add is not None else {})}
+    answer = ask(transport, board, "gateway", msgpack.packb(question))
+    if answer["refused"] is not None:
+        raise UsageError(answer["refused"])
+    found: list[dict[str, Any]] = answer["gateways"]
+    return found
+
+
+def check_type(transport: Transport, domain: int, topic: str, type_name: str) -> None:
+    """Raise UsageError when the software-mapped topic is there with another type."""
+    for key in transport.tokens(tokens_expression(domain), _LOOK_NS):
+        token = parse(key)
+        if isinstance(token, EndpointToken) and token.name == topic:
+            wanted = dds_type_name(type_name)
+            if token.dds_type != wanted:
+                raise UsageError(f"the topic {topic} has the type {token.dds_type}, not {wanted}.")

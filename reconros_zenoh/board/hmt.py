@@ -1,0 +1,301 @@
+"""Hardware-mapped topics: streams between the hardware nodes of one board.
+
+Source: Gateways, Section 2.2 (fpgaDDS): statically declared streaming networks between hardware threads. A
+topic has the key `hmt/<board>/<topic>`; nothing of it is ever in the network, except through its tap.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+
+from reconros_zenoh.board.endpoints import Event
+from reconros_zenoh.board.stream import Stream
+from reconros_zenoh.clock.activity import Signal
+from reconros_zenoh.errors import BadMessageError, UsageError
+from reconros_zenoh.ros.qos import QosProfile
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Generator, Hashable
+
+    from reconros_zenoh.board.board import Board
+    from reconros_zenoh.board.osif import Osif
+    from reconros_zenoh.board.spans import Timeline
+    from reconros_zenoh.clock.activity import Awaitable
+    from reconros_zenoh.gateway.filters import PublisherFilter
+    from reconros_zenoh.ros.types import MessageType
+    from reconros_zenoh.transport.base import Parts
+
+Policy = Literal["block", "drop"]
+FIFO_DEPTH = 2
+"""Of a FIFO whose depth is not declared: one message is worked on while the next comes in."""
+_BACKLOG = 1_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class FifoPlan:
+    """The FIFO of one subscriber: how many messages it holds, and what happens when it is full.
+
+    "block": the stream stands still until there is room; "drop": the message is lost to this subscriber.
+    A message of more than `message_bytes` does not fit (None: any does).
+    """
+
+    depth: int = FIFO_DEPTH
+    policy: Policy = "block"
+    message_bytes: int | None = None
+
+
+class Streamed(NamedTuple):
+    """A message on its way over a stream; `complete` fires when its last word is there."""
+
+    publisher: Hashable
+    message: Any
+    size: int
+    targets: list[Fifo]
+    timeline: Timeline
+    complete: Signal
+
+
+class Fifo:
+    """One subscriber's end of a stream.
+
+    It discards what `own` does not let pass. `on_ready` is called when a message has come: with its first
+    word when `cut_through`, else when its last word has been taken over.
+    """
+
+    def __init__(
+        self,
+        plan: FifoPlan,
+        on_ready: Callable[[], None],
+        own: PublisherFilter | None,
+        *,
+        cut_through: bool,
+    ) -> None:
+        self.plan = plan
+        self.on_ready = on_ready
+        self.own = own
+        self.cut_through = cut_through
+        self.dropped = 0
+        self.messages: deque[Streamed] = deque()
+        self.held = 0
+        self.room = Signal()
+        self.is_open = True
+
+    @property
+    def is_full(self) -> bool:
+        """Whether every place is taken, by messages on their way included."""
+        return self.is_open and self.held >= self.plan.depth
+
+    @property
+    def blocks(self) -> bool:
+        """Whether publishers have to wait for room here."""
+        return self.is_full and self.plan.policy == "block"
+
+    def reserve(self) -> bool:
+        """Take a place for a message, or count that it is lost here for want of one."""
+        if self.is_full:
+            self.dropped += 1
+            return False
+        self.held += 1
+        return True
+
+    def append(self, streamed: Streamed) -> None:
+        """Put a message, whose place is taken already, where its reader finds it."""
+        if self.is_open:
+            self.messages.append(streamed)
+            self.on_ready()
+
+    def take(self) -> Streamed:
+        """Remove the oldest message and return it; its place is free."""
+        streamed = self.messages.popleft()
+        self.release()
+        return streamed
+
+    def close(self) -> None:
+        """Let nobody wait for room."""
+        self.is_open = False
+        self.held += 1
+        self.release()
+
+    def release(self) -> None:
+        """Free a place."""
+        self.held -= 1
+        room, self.room = self.room, Signal()
+        room.fire()
+
+
+class HardwareTopic:
+    """A stream that any number of hardware nodes write to and read from.
+
+    One message passes at a time, to all subscribers at once, in the order in which publishers found room: one
+    that has to wait does not keep another from passing, or a gateway that is about to write could not go on
+    to read. A publisher publishes one message at a time. A message takes its size through the stream's
+    bandwidth; bodies are handed over by reference. `overhead_ns` is what a subscribing slot needs to take a
+    message over.
+    """
+
+    def __init__(self, board: Board, topic: str, message_type: MessageType) -> None:
+        model = board.profile.model
+        if model is not None and model.hmt is None:
+            raise UsageError(
+                f"profile {board.profile.name!r} has no times for the hardware-mapped topic {topic}. Add a "
+                "section [model.hmt] to a copy of the profile, or use the profile zcu104 or native."
+            )
+        section = model.hmt if model else None
+        self.key = f"hmt/{board.name}/{topic.strip('/')}"
+        self.type = message_type
+        self._board = board
+        self._overhead_ns = section.overhead.ns if section else 0
+        self._ns_per_byte = 1 / section.bandwidth.bytes_per_ns if section else 0.0
+        self._passages: Stream[Streamed] = Stream(self._pass, _BACKLOG)
+        self._fifos: list[Fifo] = []
+        self._tap: Stream[Parts] | None = None
+        self.passed = 0
+        self.waits = 0
+
+    @property
+    def dropped(self) -> int:
+        """How many messages were lost to a subscriber whose FIFO was full."""
+        return sum(fifo.dropped for fifo in self._fifos)
+
+    def subscribe(self, fifo: Fifo) -> None:
+        """Let every message that passes from now on reach this FIFO."""
+        self._fifos.append(fifo)
+
+    def unsubscribe(self, fifo: Fifo) -> None:
+        """Let nothing reach this FIFO any more; a stream that waits for its room goes on."""
+        self._fifos.remove(fifo)
+        fifo.close()
+
+    def size(self, message: Any) -> int:
+        """Return how many bytes the message has on a stream: as many as on the wire."""
+        return sum(map(len, self.type.encode(message)))
+
+    def open_tap(self) -> None:
+        """Publish what passes on the topic's key; without any cost in the model."""
+        publisher = self._board.context.transport.publish(self.key, QosProfile())
+        host = self._board.host
+
+        def put(parts: Parts) -> Generator[Awaitable, object, None]:
+            yield from host.result(host.start(self, publisher.put, parts, None))
+
+        self._tap = Stream(put, QosProfile().depth)
+
+    def publish(
+        self, publisher: Hashable, message: Any, timeline: Timeline
+    ) -> Generator[Awaitable, object, None]:
+        """Return when the message has passed; raise UsageError when it is larger than somebody's FIFO."""
+        parts = self.type.encode(message)
+        size = sum(map(len, parts))
+        for fifo in self._fifos:
+            if fifo.plan.message_bytes is not None and size > fifo.plan.message_bytes:
+                raise UsageError(
+                    f"a message of {size} bytes on {self.key} does not fit a FIFO that is declared for "
+                    f"{fifo.plan.message_bytes}. Raise the bytes in build.cfg."
+                )
+        fifos = [fifo for fifo in self._fifos if fifo.own is None or fifo.own.passes(publisher)]
+        self.waits += any(fifo.blocks for fifo in fifos)
+        while full := next((fifo for fifo in fifos if fifo.blocks), None):
+            yield full.room
+        # All places at once: who held one while waiting for another could keep a third from going on.
+        targets = [fifo for fifo in fifos if fifo.reserve()]
+        streamed = Streamed(publisher, message, size, targets, timeline, Signal())
+        self._passages.put(streamed)
+        if streamed.complete.callbacks is not None:
+            yield streamed.complete
+        if self._tap is not None:
+            self._tap.put(parts)
+
+    def _pass(self, streamed: Streamed) -> Generator[Awaitable, object, None]:
+        self.passed += 1
+        for fifo in streamed.targets:
+            if fifo.cut_through:
+                fifo.append(streamed)
+        duration_ns = round(streamed.size * self._ns_per_byte)
+        if duration_ns:
+            yield self._board.environment.timeout(duration_ns)
+        for fifo in streamed.targets:
+            if not fifo.cut_through:
+                self._hand_over(fifo, streamed)
+        streamed.complete.fire()
+
+    def _hand_over(self, fifo: Fifo, streamed: Streamed) -> None:
+        if self._overhead_ns:
+            self._board.environment.call_later(self._overhead_ns, fifo.append, streamed)
+        else:
+            fifo.append(streamed)
+
+
+class HmtSource:
+    """A hardware callback's subscription to a hardware-mapped topic: ready while a message waits."""
+
+    def __init__(self, board: Board, topic: HardwareTopic, plan: FifoPlan) -> None:
+        self._board = board
+        self._topic = topic
+        self._fifo = Fifo(plan, self._arrived, None, cut_through=False)
+        self._on_ready: Callable[[], None] = lambda: None
+        self._check: Callable[[Any], None] | None = None
+
+    @property
+    def dropped(self) -> int:
+        """How many messages found the FIFO full."""
+        return self._fifo.dropped
+
+    def open(self, on_ready: Callable[[], None], check: Callable[[Any], None] | None) -> None:
+        """Subscribe."""
+        self._on_ready = on_ready
+        self._check = check
+        self._topic.subscribe(self._fifo)
+
+    def is_ready(self) -> bool:
+        """Tell whether a message waits."""
+        return bool(self._fifo.messages)
+
+    def take(self) -> Event:
+        """Remove the oldest message and return it, as it lies in the slot."""
+        streamed = self._fifo.take()
+        timeline = streamed.timeline.fork()
+        timeline.mark("hmt")
+        return Event(streamed.message, timeline, message_type=self._topic.type, in_slot=True)
+
+    def answer(self, event: Event, response: object) -> None:
+        """Do nothing: what a subscriber's callback returns goes nowhere."""
+
+    def _arrived(self) -> None:
+        try:
+            if self._check is not None:
+                self._check(self._fifo.messages[-1].message)
+        except BadMessageError as error:
+            bad = self._fifo.messages.pop()
+            self._fifo.release()
+            self._board.context.rejections.add(self._topic.key, str(bad.publisher), error)
+            return
+        self._on_ready()
+
+
+class HmtWriter:
+    """A hardware callback's publisher on a hardware-mapped topic."""
+
+    in_slot = True
+
+    def __init__(self, topic: HardwareTopic) -> None:
+        self._topic = topic
+
+    def message(self, **fields: object) -> Any:
+        """Return a message of the topic's type with these fields."""
+        return self._topic.type.cls(**fields)
+
+    def encode(self, message: object) -> Any:  # noqa: ARG002 # as every writer has it
+        """Raise UsageError: there is no way from software onto a stream but a gateway."""
+        raise UsageError(
+            f"{self._topic.key} is mapped to hardware: a software callback cannot publish on it."
+        )
+
+    def send(self, encoded: Any, timeline: Timeline) -> None:
+        """Do nothing: `encode` has raised."""
+
+    def publish(self, message: object, osif: Osif, timeline: Timeline) -> Generator[Awaitable, object, None]:  # noqa: ARG002
+        """Return when the message has passed the stream, after waiting for room where a FIFO blocks."""
+        yield from self._topic.publish(self, message, timeline.fork())
+        timeline.mark("hmt")

@@ -1,0 +1,178 @@
+"""Software-mapped topics between nodes of one board.
+
+On a real board such a message never sees the network: the publisher's process or delegate hands it to the
+readers through main memory. Profiles without a section `[model.topics]` do not know what that costs; there
+every message takes the way through stack and link. Source: Gateways, Sections 2.2 and 4; the constants are
+fitted to its speedups.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from reconros_zenoh.board.endpoints import TopicWriter
+from reconros_zenoh.board.stream import Stream
+from reconros_zenoh.rmw.received import Received
+from reconros_zenoh.ros.graph import EndpointKind, EndpointToken, parse, tokens_expression
+from reconros_zenoh.ros.names import data_key
+from reconros_zenoh.ros.qos import QosProfile
+
+if TYPE_CHECKING:
+    from collections.abc import Generator
+
+    from reconros_zenoh.board.board import Board
+    from reconros_zenoh.board.endpoints import SubscriptionSource
+    from reconros_zenoh.board.osif import Osif
+    from reconros_zenoh.board.profile import Model, TopicsSection
+    from reconros_zenoh.board.spans import Timeline
+    from reconros_zenoh.clock.activity import Awaitable
+    from reconros_zenoh.rmw.node import Node
+    from reconros_zenoh.ros.types import MessageType
+    from reconros_zenoh.transport.base import Parts
+
+
+class LocalTopics:
+    """Who reads which topic on this board, and whether anybody elsewhere does."""
+
+    def __init__(self, board: Board, model: Model, section: TopicsSection) -> None:
+        self._board = board
+        self._publish_ns = section.publish.ns
+        self._notify_ns = section.notify_hardware.ns
+        self._notify_software_ns = section.notify_software.ns
+        self._copy_in = section.copy_in.ns_per_byte
+        self._copy_out = section.copy_out.ns_per_byte
+        self._memif_ns_per_byte = 1 / model.memif.bandwidth.bytes_per_ns
+        self._readers: defaultdict[str, list[SubscriptionSource]] = defaultdict(list)
+        self._elsewhere: defaultdict[str, set[str]] = defaultdict(set)
+        self.publishers: set[bytes] = set()
+        context = board.context
+        self._watch = context.transport.watch_tokens(
+            tokens_expression(context.domain),
+            lambda token, alive: board.environment.post(self._on_token, token, alive),
+        )
+
+    def add_reader(self, key: str, reader: SubscriptionSource) -> None:
+        """Let what is published on this key on the board reach the reader from now on."""
+        self._readers[key].append(reader)
+
+    def is_read_elsewhere(self, key: str) -> bool:
+        """Tell whether another session subscribes to the key."""
+        return bool(self._elsewhere[key])
+
+    def publish(
+        self, key: str, received: Received, timeline: Timeline, *, hardware: bool, in_place: bool = False
+    ) -> Generator[Awaitable, object, None]:
+        """Return when the publication is over; its readers go on from there.
+
+        `hardware` says where the publisher is. `in_place`: it has written the message where software readers
+        find it, so they copy nothing. Hardware readers then fetch it over the MEMIF themselves.
+        """
+        cpu, size = self._board.cpu, received.size
+        readers = self._readers[key]
+        in_hardware = [reader for reader in readers if reader.in_hardware]
+        yield from cpu.run(self._publish_ns + (0 if hardware else size * self._copy_in))
+        notify_ns = self._notify_ns if hardware else self._notify_software_ns
+        for _ in in_hardware:
+            yield from cpu.run(notify_ns)
+        timeline.mark("dds")
+        # What is left of waking the hardware readers is their delegates' work, not the publisher's.
+        rest_ns = len(in_hardware) * max(0, self._notify_ns - notify_ns)
+        for reader in readers:
+            way = timeline.fork()
+            if reader.in_hardware:
+                steps = self._wait(rest_ns, way)
+            elif in_place:
+                steps = self._wait(0, way)
+            elif hardware:
+                steps = self._wait(round(size * self._memif_ns_per_byte), way)
+            else:
+                steps = self._copy(size * self._copy_out * len(in_hardware), way)
+            reader.deliver(received, way, steps)
+
+    def close(self) -> None:
+        """Look at the graph no longer."""
+        self._watch.close()
+
+    def _wait(self, duration_ns: int, timeline: Timeline) -> Generator[Awaitable, object, bool]:
+        if duration_ns:
+            yield self._board.environment.timeout(duration_ns)
+            timeline.mark("dds")
+        return True
+
+    def _copy(self, core_time_ns: float, timeline: Timeline) -> Generator[Awaitable, object, bool]:
+        yield from self._board.cpu.run(core_time_ns)
+        timeline.mark("dds")
+        return True
+
+    def _on_token(self, key: str, alive: bool) -> None:
+        token = parse(key)
+        if (
+            isinstance(token, EndpointToken)
+            and token.kind is EndpointKind.SUBSCRIPTION
+            and token.zid != self._board.context.transport.session_id
+        ):
+            tokens = self._elsewhere[data_key(token.domain, token.name, token.dds_type, token.type_hash)]
+            (tokens.add if alive else tokens.discard)(key)
+
+
+class _Sent(NamedTuple):
+    message: Any
+    parts: Parts
+    timeline: Timeline
+
+
+class LocalTopicWriter(TopicWriter):
+    """A publisher of a board that knows what its own topics cost; stack and link only for readers elsewhere.
+
+    Bodies are handed over by reference, so a message must not change once it is published.
+    """
+
+    def __init__(
+        self,
+        board: Board,
+        node: Node,
+        message_type: MessageType,
+        topic: str,
+        topics: LocalTopics,
+        qos: QosProfile | None = None,
+        *,
+        in_place: bool = False,
+    ) -> None:
+        qos = qos or QosProfile()
+        super().__init__(board, node, message_type, topic, qos)
+        self._topics = topics
+        self._in_place = in_place
+        self._publications: Stream[_Sent] = Stream(self._publish_from_software, qos.queue_depth)
+        topics.publishers.add(self.gid)
+
+    @property
+    def dropped(self) -> int:
+        """How many messages were pushed out by newer ones."""
+        return super().dropped + self._publications.dropped
+
+    def encode(self, message: object) -> Any:
+        """Return the message, and how it goes over the wire; callable from any thread."""
+        return message, super().encode(message)
+
+    def send(self, encoded: Any, timeline: Timeline) -> None:
+        """Publish for a software callback."""
+        message, parts = encoded
+        self._publications.put(_Sent(message, parts, timeline))
+
+    def publish(self, message: object, osif: Osif, timeline: Timeline) -> Generator[Awaitable, object, None]:
+        """Return when the delegate has published; its call is part of what a publication costs."""
+        osif.calls += 1
+        yield from self._publish(_Sent(message, super().encode(message), timeline.fork()), hardware=True)
+        timeline.mark("osif")
+
+    def _publish_from_software(self, sent: _Sent) -> Generator[Awaitable, object, None]:
+        return self._publish(sent, hardware=False)
+
+    def _publish(self, sent: _Sent, *, hardware: bool) -> Generator[Awaitable, object, None]:
+        received = Received(sent.message, sum(map(len, sent.parts)), 0, publisher=self.gid)
+        yield from self._topics.publish(
+            self.key, received, sent.timeline, hardware=hardware, in_place=self._in_place
+        )
+        if self._topics.is_read_elsewhere(self.key):
+            super().send(sent.parts, sent.timeline)

@@ -1,0 +1,75 @@
+"""`reconros gateway`: the gateways of a running board."""
+
+from __future__ import annotations
+
+import json
+from typing import Annotated
+
+import typer
+
+from reconros_zenoh.cli.options import AsJson, Domain, Router
+from reconros_zenoh.errors import UsageError
+from reconros_zenoh.transport.zenoh import ZenohTransport
+
+_COUNTS = ("to_hmt", "to_smt", "late", "dropped", "refused")
+
+
+def gateway(
+    board: Annotated[str, typer.Argument(help="The board.")] = "board0",
+    hmt: Annotated[
+        str | None,
+        typer.Option(metavar="TOPIC", help="Add one: its hardware-mapped topic.", show_default=False),
+    ] = None,
+    smt: Annotated[
+        str | None,
+        typer.Option(
+            metavar="TOPIC",
+            help="Its software-mapped topic.",
+            show_default="the name of the hardware-mapped one",
+        ),
+    ] = None,
+    message_type: Annotated[
+        str | None, typer.Option("--type", metavar="PKG/TYPE", help="Its message type.", show_default=False)
+    ] = None,
+    name: Annotated[
+        str | None, typer.Option(help="The name of its node.", show_default="after the topic")
+    ] = None,
+    router: Router = "tcp/127.0.0.1:7447",
+    domain: Domain = 0,
+    as_json: AsJson = False,
+) -> None:
+    """List the gateways of a board, or add one between a hardware-mapped and a software-mapped topic.
+
+    Exit status 2 when one of the topics has a gateway already or another type.
+    """
+    from reconros_zenoh.board.gateway_control import ask_gateways, check_type
+    from reconros_zenoh.project.type_names import inline_message_type
+    from reconros_zenoh.ros.names import resolve
+
+    add = None
+    if hmt is not None:
+        try:
+            type_name = inline_message_type(message_type or "")
+        except ValueError as error:
+            raise UsageError(f"{error} Write for example --type sensor_msgs/Image.") from None
+        topic = resolve(hmt, "/", "gateway")
+        add = {
+            "name": name or f"gateway{topic.replace('/', '_')}",
+            "hmt": topic,
+            "smt": resolve(smt or hmt, "/", "gateway"),
+            "type": type_name,
+        }
+    elif smt is not None or message_type is not None or name is not None:
+        raise UsageError("a gateway needs its hardware-mapped topic. Add --hmt TOPIC.")
+    with ZenohTransport.open(router) as transport:
+        if add is not None:
+            check_type(transport, domain, add["smt"], add["type"])
+        found = ask_gateways(transport, board, add)
+    if as_json:
+        print(json.dumps({"board": board, "gateways": found}))
+        return
+    for each in found:
+        print(f"{each['name']}: {each['hmt']} <-> {each['smt']} ({each['type']})")
+        print("  " + ", ".join(f"{count} {each[count]}" for count in _COUNTS))
+    if not found:
+        print(f"board {board} has no gateway")

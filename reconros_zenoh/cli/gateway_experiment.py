@@ -1,0 +1,126 @@
+"""`reconros experiment gateway`: Section 4 of the gateways paper."""
+
+from __future__ import annotations
+
+import json
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from rich.box import SIMPLE_HEAD
+from rich.console import Console
+from rich.table import Table
+
+from reconros_zenoh.cli.options import ClockName, Out, Profile
+from reconros_zenoh.cli.progress import run_bar
+from reconros_zenoh.errors import UsageError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+_FIGURES = {"hardware": "fig6_hardware_publisher.png", "software": "fig7_software_publisher.png"}
+
+
+class PublisherName(StrEnum):
+    """Where the publisher runs."""
+
+    HARDWARE = "hardware"
+    SOFTWARE = "software"
+
+
+def gateway(
+    publisher: Annotated[
+        PublisherName | None, typer.Option(help="Where the publisher runs.", show_default="both")
+    ] = None,
+    clock: Annotated[ClockName, typer.Option(help="Real time, or virtual time.")] = ClockName.VIRTUAL,
+    sizes: Annotated[str, typer.Option(metavar="LIST", help="Message sizes.")] = "10kB,100kB,1MB,10MB",
+    subscribers: Annotated[str, typer.Option(metavar="LIST", help="Subscribers in hardware.")] = "2,4,8",
+    repeat: Annotated[int, typer.Option(min=1, help="Messages per cell.")] = 500,
+    profile: Profile = "zcu104",
+    out: Out = Path("results/gateway"),
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
+) -> None:
+    """One publisher, 2 to 8 subscribers in hardware and one in software: on an SMT, and with a gateway.
+
+    Every subscriber checks number and CRC of what it got. The profile native models nothing: real bytes
+    between real processes, publisher and subscriber in software.
+    """
+    from reconros_zenoh.board.profile import read_profile
+    from reconros_zenoh.experiments.gateway import PUBLISHERS, measure_gateway
+
+    byte_counts, counts = _sizes(sizes), _counts(subscribers)
+    board = read_profile(profile)
+    publishers = [name for name in PUBLISHERS if publisher is None or name == publisher.value]
+    with run_bar("cells", len(publishers) * len(byte_counts) * len(counts), quiet=as_json) as advance:
+        result = measure_gateway(clock.value, board, publishers, byte_counts, counts, repeat, advance)
+    paths = _write(out, result)
+    if as_json:
+        print(json.dumps(result))
+        return
+    _print(Console(), result)
+    print(f"drawings and gateway.json: {', '.join(map(str, paths))}")
+
+
+def _write(out: Path, result: dict[str, Any]) -> list[Path]:
+    from reconros_zenoh.measure.gateway_plots import transmission_figure
+
+    out.mkdir(parents=True, exist_ok=True)
+    (out / "gateway.json").write_text(json.dumps(result, indent=2) + "\n")
+    paths = []
+    for publisher in dict.fromkeys(cell["publisher"] for cell in result["cells"]):
+        paths.append(out / _FIGURES[publisher])
+        transmission_figure(result["cells"], publisher).savefig(paths[-1], dpi=120)
+    return paths
+
+
+def _print(console: Console, result: dict[str, Any]) -> None:
+    for publisher in dict.fromkeys(cell["publisher"] for cell in result["cells"]):
+        table = Table(
+            "kB", "subscribers", "SMT", "gateway", "speedup", "SMT", "gateway", "speedup",
+            box=SIMPLE_HEAD, title=f"from {publisher}: largest time to hardware, and time to software [ms]",
+        )  # fmt: skip
+        for column in table.columns:
+            column.justify = "right"
+        for cell in result["cells"]:
+            if cell["publisher"] == publisher:
+                table.add_row(
+                    f"{cell['size'] / 1000:g}",
+                    str(cell["subscribers"]),
+                    *_three(cell, "hw_max_ms", "speedup_hw"),
+                    *_three(cell, "sw_ms", "speedup_sw"),
+                )
+        console.print(table)
+    for anchor in result["anchors"]:
+        console.print(
+            f"{anchor['name']}: speedup {anchor['ours']:.2f}, paper {anchor['paper']:g} "
+            f"({anchor['error']:+.1%})"
+        )
+    for line in result.get("copies", ()):
+        console.print(line)
+
+
+def _three(cell: dict[str, Any], time: str, speedup: str) -> Iterable[str]:
+    return f"{cell['smt'][time]:.3f}", f"{cell['gateway'][time]:.3f}", f"{cell[speedup]:.2f}"
+
+
+def _sizes(text: str) -> list[int]:
+    """Return the bytes of `10kB,1MB`."""
+    units = {"kB": 1000, "MB": 1_000_000, "B": 1}
+    sizes = []
+    for word in text.split(","):
+        unit = next((unit for unit in units if word.strip().endswith(unit)), "")
+        number = word.strip().removesuffix(unit)
+        if not (unit and number.isascii() and number.isdigit() and int(number)):
+            raise UsageError(f"{word!r} is no message size. Write for example --sizes 10kB,1MB.")
+        sizes.append(int(number) * units[unit])
+    return sizes
+
+
+def _counts(text: str) -> list[int]:
+    from reconros_zenoh.applications.gateway.nodes import SUBSCRIBERS
+
+    words = [word.strip() for word in text.split(",")]
+    if not all(word.isascii() and word.isdigit() and 1 <= int(word) <= SUBSCRIBERS for word in words):
+        raise UsageError(f"{text!r} are no numbers of subscribers from 1 to {SUBSCRIBERS}, such as 2,4,8.")
+    return [int(word) for word in words]

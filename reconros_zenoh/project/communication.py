@@ -1,0 +1,129 @@
+"""Whether the topics of a project can be mapped as its files say, before anything starts."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from itertools import product
+from typing import TYPE_CHECKING
+
+from reconros_zenoh.errors import FileError
+from reconros_zenoh.gateway.filters import Pair, conflict
+from reconros_zenoh.ros.names import resolve
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from reconros_zenoh.project.build_cfg import BuildConfiguration
+    from reconros_zenoh.project.mapping_file import CallbackMapping
+    from reconros_zenoh.project.resource_groups import Resource
+
+_ENDS = {"rossub": "subscriber", "rospub": "publisher"}
+
+
+def topic_name(resource: Resource) -> str:
+    """Return the absolute name of the topic that a rossub or rospub belongs to."""
+    assert resource.node is not None
+    assert resource.ros_name is not None
+    namespace, _, node = resource.node.rpartition("/")
+    return resolve(resource.ros_name, namespace or "/", node)
+
+
+def check_topics(configuration: BuildConfiguration) -> None:
+    """Raise FileError at the line of the first topic or gateway that cannot be mapped as declared."""
+    hardware: defaultdict[str, list[Resource]] = defaultdict(list)
+    software: defaultdict[str, list[Resource]] = defaultdict(list)
+    for resource in configuration.resources:
+        if resource.type in _ENDS:
+            (hardware if resource.hardware_mapped else software)[topic_name(resource)].append(resource)
+    _check_gateways(configuration, hardware, software)
+    bridged = {resolve(gateway.hw_topic, "/", "gateway") for gateway in configuration.gateways}
+    for topic, ends in hardware.items():
+        _check_ends(configuration, topic, ends)
+        for end in software[topic]:
+            if topic not in bridged:
+                raise FileError(
+                    configuration.path,
+                    end.line,
+                    f"{topic} is mapped to hardware (line {ends[0].line}), and has a software-mapped "
+                    f"{_ENDS[end.type]} but no gateway.",
+                    f"Declare a `[ROSGateway@name]` with `HWTopic = {topic}`.",
+                )
+
+
+def check_places(configuration: BuildConfiguration, callbacks: Mapping[str, CallbackMapping]) -> None:
+    """Raise FileError at the line of a hardware-mapped end whose callback may run in software."""
+    for thread in configuration.threads:
+        for resource in configuration.resources:
+            if (
+                resource.hardware_mapped
+                and resource.group in thread.resource_groups
+                and callbacks[thread.name].software
+            ):
+                raise FileError(
+                    configuration.path,
+                    resource.line,
+                    f"The callback {thread.name} is mapped to software, but {resource.name} is a "
+                    f"{_ENDS[resource.type]} of a hardware-mapped topic.",
+                    "Map the callback to slots only, or the topic to software, with a gateway between.",
+                )
+    for gateway in configuration.gateways:
+        for name, callback in callbacks.items():
+            if set(gateway.slots) & set(callback.slots):
+                raise FileError(
+                    configuration.path,
+                    gateway.line,
+                    f"The gateway {gateway.name} sits in a slot that the callback {name} is mapped to.",
+                    "Give the gateway a slot of its own.",
+                )
+
+
+def _check_ends(configuration: BuildConfiguration, topic: str, ends: list[Resource]) -> None:
+    for end in ends:
+        if end.interface != ends[0].interface:
+            raise FileError(
+                configuration.path,
+                end.line,
+                f"{topic} has the type {end.interface} here and {ends[0].interface} in line {ends[0].line}.",
+                "A topic has one type.",
+            )
+    publishers = [end for end in ends if end.type == "rospub" and end.fifo.message_bytes is not None]
+    for publisher, subscriber in product(publishers, (end for end in ends if end.type == "rossub")):
+        held, sent = subscriber.fifo.message_bytes, publisher.fifo.message_bytes
+        if held is not None and sent is not None and sent > held:
+            raise FileError(
+                configuration.path,
+                subscriber.line,
+                f"The FIFO of {subscriber.name} holds messages of {held} bytes, but {publisher.name} (line "
+                f"{publisher.line}) publishes up to {sent} on {topic}.",
+                "Raise its message_bytes.",
+            )
+
+
+def _check_gateways(
+    configuration: BuildConfiguration,
+    hardware: Mapping[str, list[Resource]],
+    software: Mapping[str, list[Resource]],
+) -> None:
+    pairs: list[Pair] = []
+    for gateway in configuration.gateways:
+        pair = Pair(
+            resolve(gateway.hw_topic, "/", gateway.name), resolve(gateway.sw_topic, "/", gateway.name)
+        )
+        taken = conflict(pair, pairs)
+        if taken is not None:
+            raise FileError(
+                configuration.path,
+                gateway.line,
+                f"{taken} is mapped twice: it has a gateway already.",
+                f"Take [ROSGateway@{gateway.name}] away.",
+            )
+        pairs.append(pair)
+        for end in (*hardware.get(pair.hmt, ()), *software.get(pair.smt, ())):
+            if end.interface != gateway.type:
+                raise FileError(
+                    configuration.path,
+                    gateway.line,
+                    f"The gateway {gateway.name} has the type {gateway.type}, but {end.name} in line "
+                    f"{end.line} has {end.interface}.",
+                    "Write the type of the topics.",
+                )

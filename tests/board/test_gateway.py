@@ -1,0 +1,215 @@
+"""A gateway in the model: what it costs, what it forwards, and what it keeps apart.
+
+The MEMIF and a stream move 1 B/ns; the other constants are powers of ten apart.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+from small_board import desktop, small_board, small_profile, start, types
+
+from reconros_zenoh.board.control import gateways
+from reconros_zenoh.board.endpoints import SubscriptionSource
+from reconros_zenoh.board.hmt import Fifo, FifoPlan
+from reconros_zenoh.board.profile import Profile, read_profile
+from reconros_zenoh.board.spans import Timeline
+from reconros_zenoh.clock.virtual import VirtualEnvironment
+from reconros_zenoh.errors import UsageError
+from reconros_zenoh.transport.simulated import SimulatedNetwork
+
+if TYPE_CHECKING:
+    from reconros_zenoh.board.board import Board
+
+TOPICS = {
+    "publish": 1_000_000,
+    "notify_hardware": 10_000,
+    "notify_software": 9_000,
+    "copy_in": 3,
+    "copy_out": 0.5,
+}
+A, D, E, K, L = TOPICS.values()
+G, C = 100_000_000, 20_000_000
+words = types().message("std_msgs/msg/UInt8MultiArray")
+layout = types().message("std_msgs/msg/MultiArrayLayout").cls(dim=[], data_offset=0)
+HEADER = 16
+U = 1000
+
+
+def message(number: int = 0, size: int = U) -> Any:
+    """A message of `size` bytes on the wire whose first byte is the number."""
+    data = np.zeros(size - HEADER, np.uint8)
+    data[0] = number
+    return words.cls(layout=layout, data=data)
+
+
+def modelled(**options: Any) -> Profile:
+    return small_profile(topics=TOPICS, cores=4, hmt_overhead_ns=G, cancel_ns=C, **options)
+
+
+class Side:
+    """A board with a gateway between /a in hardware and /a in software, and who heard what when on it."""
+
+    def __init__(self, board: Board, subscribers: int = 2) -> None:
+        self.board = board
+        self.environment = board.environment
+        self.node = board.context.node("n")
+        self.topic = board.hardware_topic("/a", words)
+        self.hardware: list[list[tuple[int, Any]]] = [[] for _ in range(subscribers)]
+        for heard in self.hardware:
+            self._listen(heard)
+        self.software: list[tuple[int, Any]] = []
+        source = SubscriptionSource(board, self.node, words, "/a")
+        source.open(lambda: self.software.append((self.environment.now, source.take().message)), None)
+        self.writer = board.writer(self.node, words, "/a")
+        self.gateway = board.add_gateway("bridge", "/a", "/a", words)
+
+    def _listen(self, heard: list[tuple[int, Any]]) -> None:
+        def note() -> None:
+            heard.append((self.environment.now, fifo.take().message))
+
+        fifo = Fifo(FifoPlan(100), note, None, cut_through=False)
+        self.topic.subscribe(fifo)
+
+    def publish_in_hardware(self, body: Any) -> None:
+        start(
+            self.environment, self.topic.publish("p", body, Timeline(self.environment, self.environment.now))
+        )
+
+    def publish_in_software(self, body: Any) -> None:
+        self.writer.send(self.writer.encode(body), Timeline(self.environment, self.environment.now))
+
+    def numbers(self) -> list[list[int]]:
+        return [[int(body.data[0]) for _, body in heard] for heard in (*self.hardware, self.software)]
+
+
+@pytest.mark.parametrize("subscribers", [1, 4])
+def test_from_hardware_a_message_is_streamed_to_all_and_written_to_memory_once(subscribers: int) -> None:
+    side = Side(small_board(modelled()), subscribers)
+    body = message()
+    side.publish_in_hardware(body)
+    side.environment.run()
+    assert side.hardware == [[(U + G, body)]] * subscribers
+    assert side.software == [(U + C + A + D, body)]
+    assert side.software[0][1] is body
+    assert side.board.memif.transferred_bytes == U
+
+
+@pytest.mark.parametrize("subscribers", [1, 4])
+def test_from_software_it_is_read_from_memory_once_while_it_is_streamed(subscribers: int) -> None:
+    side = Side(small_board(modelled()), subscribers)
+    body = message()
+    side.publish_in_software(body)
+    side.environment.run()
+    assert side.hardware == [[(A + K * U + D + U + G, body)]] * subscribers
+    assert side.software == [(A + K * U + E + L * U, body)]
+    assert side.hardware[0][0][1] is body
+    assert side.board.memif.transferred_bytes == U
+
+
+def test_a_message_between_request_and_cancel_is_forwarded() -> None:
+    side = Side(small_board(modelled()))
+    # Published on the SMT so that it is ready while the core cancels for what came over the HMT.
+    side.publish_in_software(message(1))
+    side.environment.run(until=A + K * U + D - 2 * U)
+    side.publish_in_hardware(message(2))
+    side.environment.run()
+    assert side.gateway.late == 1
+    assert side.numbers() == [[2, 1], [2, 1], [1, 2]]
+    assert (side.gateway.to_hmt, side.gateway.to_smt) == (1, 1)
+
+
+def test_messages_from_both_sides_take_turns() -> None:
+    side = Side(small_board(modelled()))
+    for number in range(6):
+        side.publish_in_software(message(number))
+        side.publish_in_hardware(message(100 + number))
+    side.environment.run()
+    for heard in side.numbers():
+        assert [number for number in heard if number < 100] == list(range(6))
+        assert [number for number in heard if number >= 100] == list(range(100, 106))
+        assert len(heard) == 12
+    assert (side.gateway.to_hmt, side.gateway.to_smt, side.gateway.dropped) == (6, 6, 0)
+
+
+@pytest.mark.parametrize("profile", [modelled(), small_profile(), read_profile("native")])
+def test_boards_whose_gateways_share_a_topic_hear_each_other_once(profile: Profile) -> None:
+    network = SimulatedNetwork(VirtualEnvironment())
+    sides = [Side(small_board(profile, network=network, name=f"board{index}")) for index in range(3)]
+    network.environment.run()
+    heard_elsewhere: list[int] = []
+    node = desktop(sides[0].board).node("desk")
+    node.subscription(words, "/a", lambda received: heard_elsewhere.append(int(received.message.data[0])))
+    network.environment.run()
+    for number, side in enumerate(sides):
+        side.publish_in_hardware(message(number))
+        side.publish_in_software(message(10 + number))
+    network.environment.run()
+    for side in sides:
+        for heard in side.numbers():
+            assert sorted(heard) == [0, 1, 2, 10, 11, 12]
+    assert sorted(heard_elsewhere) == [0, 1, 2, 10, 11, 12]
+
+
+def test_a_message_that_no_fifo_holds_is_refused_and_the_gateway_goes_on() -> None:
+    side = Side(small_board(modelled()))
+    side.topic.subscribe(Fifo(FifoPlan(100, message_bytes=U), lambda: None, None, cut_through=False))
+    side.publish_in_software(message(1, U + 1))
+    side.publish_in_software(message(2))
+    side.environment.run()
+    assert side.gateway.refused == 1
+    assert side.numbers() == [[2], [2], [1, 2]]
+
+
+def test_a_second_gateway_on_a_topic_is_refused_and_so_is_another_type() -> None:
+    side = Side(small_board(modelled()))
+    for hmt, smt, taken in (("/a", "/b", "hmt/board0/a"), ("/b", "/a", "/a")):
+        with pytest.raises(UsageError, match=f"^{taken} has a gateway on board 'board0' already"):
+            side.board.add_gateway("second", hmt, smt, words)
+    with pytest.raises(UsageError, match="has the type std_msgs/msg/UInt8MultiArray"):
+        side.board.add_gateway("second", "/a", "/b", types().message("std_msgs/msg/UInt32"))
+    side.publish_in_software(message(1))
+    side.environment.run()
+    assert side.numbers() == [[1], [1], [1]]
+
+
+def test_a_profile_must_know_gateways() -> None:
+    profile = modelled()
+    assert profile.model is not None
+    ignorant = profile.model_copy(update={"model": profile.model.model_copy(update={"gateway": None})})
+    with pytest.raises(UsageError, match=r"\[model.gateway\]"):
+        small_board(ignorant).add_gateway("g", "/a", "/a", words)
+
+
+def test_a_closed_board_takes_its_gateway_out_of_the_graph() -> None:
+    network = SimulatedNetwork(VirtualEnvironment())
+    left, stays = (Side(small_board(modelled(), network=network, name=f"board{index}")) for index in (1, 2))
+    network.environment.run()
+    left.board.close()
+    left.node.close()
+    stays.publish_in_hardware(message(1))
+    network.environment.run()
+    assert stays.numbers() == [[1], [1], [1]]
+    assert left.numbers() == [[], [], []]
+
+
+def test_the_status_tells_what_passed() -> None:
+    side = Side(small_board(modelled()))
+    side.publish_in_software(message(1))
+    side.publish_in_hardware(message(2))
+    side.environment.run()
+    assert gateways(side.board) == [
+        {
+            "name": "bridge",
+            "hmt": "hmt/board0/a",
+            "smt": "/a",
+            "type": "std_msgs/msg/UInt8MultiArray",
+            "to_hmt": 1,
+            "to_smt": 1,
+            "late": 1,
+            "dropped": 0,
+            "refused": 0,
+        }
+    ]

@@ -1,0 +1,182 @@
+"""Messages between nodes of one board: the times that follow from the constants of [model.topics].
+
+The constants are powers of ten apart, so that a sum tells what it is made of. The MEMIF moves 1 B/ns.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+from small_board import desktop, small_board, small_profile, types
+
+from reconros_zenoh.board.endpoints import SubscriptionSource
+from reconros_zenoh.board.executor import Executor
+from reconros_zenoh.board.local_topics import LocalTopicWriter
+from reconros_zenoh.board.spans import Timeline
+from reconros_zenoh.clock.activity import Activity
+from reconros_zenoh.errors import BadMessageError
+from reconros_zenoh.executor.callbacks import CallbackKind
+from reconros_zenoh.gateway.filters import PublisherFilter
+
+if TYPE_CHECKING:
+    from small_board import Steps
+
+TOPICS = {
+    "publish": 1_000_000,
+    "notify_hardware": 10_000,
+    "notify_software": 9_000,
+    "copy_in": 3,
+    "copy_out": 0.5,
+}
+A, D, E, K, L = TOPICS.values()
+words = types().message("std_msgs/msg/UInt8MultiArray")
+layout = types().message("std_msgs/msg/MultiArrayLayout").cls(dim=[], data_offset=0)
+HEADER = 16
+U = 1000
+
+
+class Setup:
+    """One topic with n hardware subscribers and one in software; who got the message when."""
+
+    def __init__(self, hardware: int, **options: Any) -> None:
+        names = [f"h{index}" for index in range(hardware)]
+        self.board = small_board(
+            small_profile(
+                dict.fromkeys([*names, "s"], (0, 0)), topics=TOPICS, cores=4, link_ns=50, **options
+            ),
+            slots=hardware,
+        )
+        self.environment = self.board.environment
+        self.node = self.board.context.node("n")
+        self.got: dict[str, list[tuple[int, Any]]] = {name: [] for name in [*names, "s"]}
+        executor = Executor(self.board, 1, hardware)
+        for slot, name in enumerate(names):
+            source = SubscriptionSource(self.board, self.node, words, "/a", in_hardware=True)
+            executor.add_hw_callback(name, [slot], CallbackKind.SUB, source, self.hardware(name))
+        self.software = SubscriptionSource(self.board, self.node, words, "/a")
+        executor.add_sw_callback(
+            "s", CallbackKind.SUB, self.software, lambda message, _: self.note("s", message)
+        )
+        executor.spin()
+        writer = self.board.writer(self.node, words, "/a")
+        assert isinstance(writer, LocalTopicWriter)
+        self.writer = writer
+        # The first message finds the slots empty.
+        self.publish(hardware=True)
+        for received in self.got.values():
+            received.clear()
+        self.started_ns = self.environment.now
+        self.board.memif.transferred_bytes = 0
+
+    def note(self, name: str, message: Any) -> None:
+        self.got[name].append((self.environment.now, message))
+
+    def hardware(self, name: str) -> Any:
+        def thread(hardware: Any) -> Steps:
+            message = yield from hardware.get_init_data()
+            yield from hardware.mem_read(message.data)
+            self.note(name, message)
+
+        return thread
+
+    def publish(self, *, hardware: bool) -> Any:
+        body = words.cls(layout=layout, data=np.zeros(U, np.uint8))
+        timeline = Timeline(self.environment, self.environment.now)
+        if hardware:
+            Activity(self.writer.publish(body, self.board.osif, timeline))
+        else:
+            self.writer.send(self.writer.encode(body), timeline)
+        self.environment.run()
+        return body
+
+    def times(self) -> dict[str, int]:
+        return {name: received[0][0] - self.started_ns for name, received in self.got.items()}
+
+
+@pytest.mark.parametrize("n", [1, 2, 4])
+def test_from_hardware_the_readers_share_the_memif_and_software_copies_at_its_speed(n) -> None:
+    setup = Setup(n)
+    setup.publish(hardware=True)
+    assert setup.times() == {
+        **{f"h{index}": A + n * D + n * U for index in range(n)},
+        "s": A + n * D + U + HEADER,
+    }
+    assert setup.board.memif.transferred_bytes == n * U
+
+
+@pytest.mark.parametrize("n", [1, 2, 4])
+def test_from_software_the_publisher_copies_and_readers_in_hardware_slow_the_one_in_software(n) -> None:
+    setup = Setup(n)
+    setup.publish(hardware=False)
+    size = U + HEADER
+    assert setup.times() == {
+        **{f"h{index}": A + K * size + n * D + n * U for index in range(n)},
+        "s": A + K * size + n * E + n * L * size,
+    }
+
+
+def test_the_message_is_handed_over_by_reference_and_nothing_leaves_the_board() -> None:
+    setup = Setup(2)
+    put = []
+    setup.writer._publisher.publish_encoded = put.append  # type: ignore[method-assign]
+    body = setup.publish(hardware=True)
+    assert all(received[0][1].data is body.data for received in setup.got.values())
+    assert not put
+
+
+def test_a_reader_elsewhere_gets_it_over_the_link_and_those_here_get_it_once() -> None:
+    setup = Setup(2)
+    heard = []
+    desktop(setup.board).node("desk").subscription(words, "/a", lambda _: heard.append(setup.environment.now))
+    setup.environment.run()
+    setup.publish(hardware=True)
+    assert len(heard) == 1
+    assert [len(received) for received in setup.got.values()] == [1, 1, 1]
+    assert heard[0] - setup.started_ns == A + 2 * D + 50
+
+
+def test_a_reader_that_has_gone_costs_nothing_any_more() -> None:
+    setup = Setup(1)
+    node = desktop(setup.board).node("desk")
+    node.subscription(words, "/a", lambda _: None)
+    setup.environment.run()
+    assert setup.board.topics is not None
+    assert setup.board.topics.is_read_elsewhere(setup.writer.key)
+    node.close()
+    setup.environment.run()
+    assert not setup.board.topics.is_read_elsewhere(setup.writer.key)
+
+
+def test_messages_from_elsewhere_still_come_through_the_stack() -> None:
+    setup = Setup(1)
+    publisher = desktop(setup.board).node("desk").publisher(words, "/a")
+    setup.environment.run()
+    publisher.publish(words.cls(layout=layout, data=np.zeros(U, np.uint8)))
+    setup.environment.run()
+    assert setup.times() == {"h0": 50 + U, "s": 50}
+
+
+def test_filter_and_check_hold_for_messages_of_the_board() -> None:
+    setup = Setup(0)
+    own = SubscriptionSource(setup.board, setup.node, words, "/a", own=PublisherFilter(setup.writer.gid))
+    own.open(lambda: None, None)
+
+    def check(_: Any) -> None:
+        raise BadMessageError("image_size", "too small")
+
+    strict = SubscriptionSource(setup.board, setup.node, words, "/a")
+    strict.open(lambda: None, check)
+    setup.publish(hardware=False)
+    assert (own.is_ready(), strict.is_ready()) == (False, False)
+    assert dict(setup.board.context.rejections.counts()) == {"image_size": 1}
+
+
+def test_a_reader_that_is_too_slow_keeps_the_last() -> None:
+    setup = Setup(0)
+    lazy = SubscriptionSource(setup.board, setup.node, words, "/a")
+    lazy.open(lambda: None, None)
+    for _ in range(12):
+        setup.publish(hardware=False)
+    assert lazy.dropped == 2

@@ -1,0 +1,186 @@
+"""Section 4 of the gateways paper in virtual time: the text's figures, and that the checks check."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from functools import cache
+from importlib.resources import as_file, files
+from typing import Any
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from board_daemon.hosting import BoardOptions, HostedBoard
+from reconros_zenoh.applications.gateway.nodes import Publisher, random_body, run_nodes
+from reconros_zenoh.board.profile import read_profile
+from reconros_zenoh.cli.experiment import app
+from reconros_zenoh.clock.virtual import VirtualEnvironment
+from reconros_zenoh.errors import ExperimentError, UsageError
+from reconros_zenoh.experiments import gateway
+from reconros_zenoh.experiments.gateway import (
+    COUNTS,
+    PUBLISHERS,
+    SIZES,
+    anchors,
+    measure_gateway,
+    setup_mapping,
+)
+from reconros_zenoh.project.loader import load_project
+from reconros_zenoh.transport.simulated import SimulatedNetwork
+
+
+@cache
+def all_cells() -> dict[str, Any]:
+    return measure_gateway(
+        "virtual", read_profile("zcu104"), PUBLISHERS, SIZES.values(), COUNTS, 2, lambda: None
+    )
+
+
+def test_every_figure_of_the_text_is_met_within_a_tenth() -> None:
+    result = all_cells()
+    assert len(result["cells"]) == 24
+    assert len(result["anchors"]) == 7
+    for anchor in result["anchors"]:
+        assert abs(anchor["error"]) < 0.1, anchor
+        assert anchor["error"] == pytest.approx(anchor["ours"] / anchor["paper"] - 1)
+    assert result["host"]["overruns"] == 0
+
+
+def test_the_trends_of_the_text() -> None:
+    cells = {(cell["publisher"], cell["size"], cell["subscribers"]): cell for cell in all_cells()["cells"]}
+    small, large = SIZES["10kB"], SIZES["10MB"]
+    for count in COUNTS:
+        assert (
+            cells["hardware", small, count]["speedup_sw"] < cells["hardware", large, count]["speedup_sw"] <= 1
+        )
+    assert cells["software", small, 2]["speedup_hw"] < 1
+    for publisher in PUBLISHERS:
+        for size in SIZES.values():
+            speedups = [cells[publisher, size, count]["speedup_hw"] for count in COUNTS]
+            assert speedups == sorted(speedups)
+    assert all(
+        cells["hardware", size, count]["speedup_hw"] > 1 for size in SIZES.values() for count in COUNTS
+    )
+    assert all(
+        cells["software", size, count]["speedup_sw"] > 1 for size in SIZES.values() for count in COUNTS
+    )
+
+
+def test_anchors_need_their_cells() -> None:
+    assert anchors([]) == []
+
+
+@pytest.mark.parametrize("publisher", PUBLISHERS)
+@pytest.mark.parametrize(("variant", "transfers"), [("smt", 4), ("bridged", 1)])
+def test_one_memif_transfer_per_message_with_a_gateway(publisher: Any, variant: str, transfers: int) -> None:
+    environment = VirtualEnvironment()
+    got: list[str] = []
+
+    def note(name: str, *_: int) -> None:
+        got.append(name)
+
+    body = random_body(SIZES["100kB"])
+    with as_file(files("reconros_zenoh.applications.gateway") / variant) as folder:
+        project = load_project(folder)
+    hosted = HostedBoard(
+        environment,
+        SimulatedNetwork(environment).transport("b0"),
+        read_profile("zcu104"),
+        replace(
+            project, main=lambda app: run_nodes(app, body, on_received=lambda name, *_: got.append(name))
+        ),
+        setup_mapping(publisher, 4),
+        BoardOptions(),
+    )
+    environment.run(until=1_500_000_000)  # the timer's first period, and time enough for one message
+    hosted.close()
+    assert sorted(got) == ["hardware_0", "hardware_1", "hardware_2", "hardware_3", "software"]
+    in_slots = (
+        variant == "smt" and publisher == "hardware"
+    )  # the publisher writes the message to memory first
+    expected = (transfers + in_slots) * len(body)
+    assert hosted.board.memif.transferred_bytes == pytest.approx(expected, rel=0.001)
+
+
+def test_a_wrong_body_ends_the_experiment(monkeypatch: pytest.MonkeyPatch) -> None:
+    right = Publisher._image
+
+    def wrong(self: Publisher, now_ns: int) -> Any:
+        image = right(self, now_ns)
+        image.data = np.zeros_like(image.data)
+        return image
+
+    monkeypatch.setattr(Publisher, "_image", wrong)
+    with pytest.raises(ExperimentError, match="message 1 reached 0 of 3 subscribers rightly"):
+        gateway._run("virtual", read_profile("zcu104"), "smt", "hardware", 2, random_body(100), 1)
+
+
+def test_a_profile_without_topics_is_refused() -> None:
+    with pytest.raises(UsageError, match="does not know what topics inside a board cost"):
+        measure_gateway("virtual", read_profile("miniitx-zynq7100"), PUBLISHERS, [10], [2], 1, lambda: None)
+
+
+def run(*arguments: str) -> Any:
+    return CliRunner().invoke(app, ["gateway", "--repeat", "1", *arguments])
+
+
+def test_the_command_prints_one_json_object_and_draws(tmp_path) -> None:
+    result = run("--sizes", "10kB", "--subscribers", "2,4", "--json", "--out", str(tmp_path))
+    assert result.exit_code == 0
+    printed = json.loads(result.stdout)
+    assert [(cell["publisher"], cell["size"], cell["subscribers"]) for cell in printed["cells"]] == [
+        (publisher, 10_000, count) for publisher in PUBLISHERS for count in (2, 4)
+    ]
+    cell = printed["cells"][0]
+    assert set(cell) == {"publisher", "size", "subscribers", "smt", "gateway", "speedup_hw", "speedup_sw"}
+    assert set(cell["smt"]) == set(cell["gateway"]) == {"hw_max_ms", "sw_ms"}
+    assert json.loads((tmp_path / "gateway.json").read_text()) == printed
+    assert {path.name for path in tmp_path.glob("*.png")} == {
+        "fig6_hardware_publisher.png",
+        "fig7_software_publisher.png",
+    }
+
+
+def test_the_command_prints_a_table(tmp_path) -> None:
+    result = run("--sizes", "10kB", "--publisher", "software", "--out", str(tmp_path))
+    assert "from software" in result.stdout
+    assert "from hardware" not in result.stdout
+    assert "software to software, smallest: speedup 1.06, paper 1.06" in result.stdout
+    assert "…" not in result.stdout
+
+
+@pytest.mark.parametrize(
+    ("option", "text", "words"),
+    [
+        ("--sizes", "10", "'10' is no message size"),
+        ("--sizes", "0kB", "'0kB' is no message size"),
+        ("--subscribers", "2,9", "'2,9' are no numbers of subscribers"),
+        ("--subscribers", "", "are no numbers of subscribers"),
+    ],
+)
+def test_what_cannot_be_measured_is_refused(option: str, text: str, words: str) -> None:
+    result = run(option, text)
+    assert isinstance(result.exception, UsageError)
+    assert words in str(result.exception)
+
+
+@pytest.mark.parametrize("variant", ["smt", "bridged"])
+def test_the_projects_run_with_a_publisher_on_each_side(variant: str) -> None:
+    environment = VirtualEnvironment()
+    with as_file(files("reconros_zenoh.applications.gateway") / variant) as folder:
+        project = load_project(folder)
+    assert not project.configuration.warnings
+    hosted = HostedBoard(
+        environment,
+        SimulatedNetwork(environment).transport("b0"),
+        read_profile("zcu104"),
+        project,
+        project.mapping("both_publishers"),
+        BoardOptions(),
+    )
+    environment.run(until=3_500_000_000)
+    for name, callback in hosted.executor.statistics().items():
+        assert (callback["calls"], callback["failed"]) == (3 if name.startswith("publisher") else 6, 0), name
+    hosted.close()
