@@ -8,7 +8,8 @@ ReconrosError
 ├── TransportError         the network did not do what was asked (no router, port in use, closed)
 ├── BadMessageError        a message that is counted and dropped; never ends a process
 ├── CallbackError          a callback that did what it may not; it is failed, the board goes on
-│   └── PageFaultError     the same, at an address where its memory does not reach
+│   ├── PageFaultError     it read or wrote where its memory does not reach
+│   └── CallbackLimitError it did not end within its limit
 └── ExperimentError        an experiment that could not be completed
 """
 
@@ -89,6 +90,13 @@ class PageFaultError(CallbackError):
             f"page fault: callback {callback} in slot {slot} cannot {access} {size} bytes at {address:#x}, "
             "which do not lie in one block of its memory. Check the offset, the length and the pointer."
         )
+
+
+class CallbackLimitError(CallbackError):
+    """A callback did not end within its limit."""
+
+    def __init__(self, callback: str, limit_ns: int) -> None:
+        super().__init__(f"callback {callback} did not end within its limit of {limit_ns / 1e6:g} ms.")
 
 
 class ExperimentError(ReconrosError):

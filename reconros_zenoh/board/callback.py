@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from reconros_zenoh.board.bitstream import Bitstream
     from reconros_zenoh.board.board import Board
     from reconros_zenoh.board.endpoints import Event, MessageWriter
+    from reconros_zenoh.board.host import Limit
     from reconros_zenoh.board.slots import ReconfigurableSlot
     from reconros_zenoh.board.software import Outlet
     from reconros_zenoh.board.timing import ExecutionTime
@@ -45,6 +46,7 @@ class HardwareImplementation:
     bitstream: Bitstream
     callback: HardwareCallback
     time: ExecutionTime
+    limit: Limit | None
 
 
 class ThreadExit(Exception):  # noqa: N818 - it ends the callback as SystemExit ends a program
@@ -114,14 +116,20 @@ class HardwareThread(DelegateCalls):
     """
 
     def __init__(
-        self, board: Board, callback: str, slot: ReconfigurableSlot, event: Event, time: ExecutionTime
+        self,
+        board: Board,
+        callback: str,
+        slot: ReconfigurableSlot,
+        event: Event,
+        implementation: HardwareImplementation,
     ) -> None:
         super().__init__(board.osif, event.timeline)
         self._board = board
         self._environment = board.environment
         self._callback = callback
         self._slot = slot
-        self._time = time
+        self._time = implementation.time
+        self._limit = implementation.limit
         self._in_slot = event.in_slot
         self._message = (
             event.message
@@ -199,7 +207,7 @@ class HardwareThread(DelegateCalls):
         host = self._board.host
         if self._time.ns is None and self._time.modelled:
             return (yield from self._compute_as_measured(kernel, *arguments))
-        future = host.start(kernel, partial(host.compute, kernel, *arguments))
+        future = host.start(kernel, partial(host.compute, kernel, *arguments), limit=self._limit)
         if self._time.ns is None:
             result: R = yield from host.result(future)
             self._timeline.mark("execution")
@@ -267,7 +275,8 @@ class HardwareThread(DelegateCalls):
         self, kernel: Callable[..., R], *arguments: object
     ) -> Generator[Awaitable, object, R]:
         host, started_ns = self._board.host, self._environment.now
-        future = host.start(kernel, partial(host.compute, measured, kernel, *arguments))
+        task = partial(host.compute, measured, kernel, *arguments)
+        future = host.start(kernel, task, limit=self._limit)
         result: R
         result, took_ns = yield from host.result(future)
         yield from host.until(started_ns + round(took_ns * self._time.factor))

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from reconros_zenoh.board.bitstream import Bitstream, read_bitstreams
 from reconros_zenoh.board.callback import HardwareImplementation
 from reconros_zenoh.board.hmt import HmtSource
+from reconros_zenoh.board.host import Limit
 from reconros_zenoh.board.software import SoftwareImplementation
 from reconros_zenoh.board.timing import hardware_time, software_time
 from reconros_zenoh.board.workers import HardwareWorker, SoftwareWorker
@@ -44,14 +45,14 @@ class _Registration:
     source: Source
     check: Callable[[Any], None] | None
     software: SoftwareImplementation | None = None
-    slots: dict[int, tuple[HardwareCallback, ExecutionTime]] = field(default_factory=dict)
+    slots: dict[int, tuple[HardwareCallback, ExecutionTime, Limit | None]] = field(default_factory=dict)
 
     def timing(self) -> dict[str, object]:
         """Return what the time of the callback rests on in each place where it may run."""
         places: dict[str, object] = {}
         if self.software is not None:
             places["software"] = self.software.time.describe()
-        for _, time in self.slots.values():
+        for _, time, _ in self.slots.values():
             places["hardware"] = time.describe()
         return places
 
@@ -100,17 +101,21 @@ class Executor:
         function: SoftwareCallback,
         check: Callable[[Any], None] | None = None,
         timing: Timing | None = None,
+        limit_ms: float | None = None,
     ) -> None:
         """Let the callback `name` run as a function; `check` raises BadMessageError for bad messages.
 
-        How long it takes says `timing`, or without it the table of the profile.
+        How long it takes says `timing`, or without it the table of the profile. A call that takes longer than
+        `limit_ms` is failed and its worker goes on; what its function still does is not heard of.
         """
         if isinstance(source, HmtSource):
             raise UsageError(f"callback {name!r} reads a hardware-mapped topic: it cannot run in software.")
         if not self._software_workers:
             raise UsageError(f"callback {name!r} runs in software, but there are no software workers.")
         time = software_time(self.board.profile, name, timing)
-        self._register(name, kind, source, check).software = SoftwareImplementation(function, time)
+        self._register(name, kind, source, check).software = SoftwareImplementation(
+            function, time, _limit(name, limit_ms)
+        )
 
     def add_hw_callback(
         self,
@@ -121,14 +126,19 @@ class Executor:
         thread: HardwareCallback,
         check: Callable[[Any], None] | None = None,
         timing: Timing | None = None,
+        limit_ms: float | None = None,
     ) -> None:
-        """Let the callback `name` run in these slots; `check` and `timing` as in `add_sw_callback`."""
+        """Let the callback `name` run in these slots; the rest is as in `add_sw_callback`."""
         served = {slot.slot_id for slot in self._slots}
         for slot in slots:
             if slot not in served:
                 raise UsageError(f"callback {name!r} needs slot {slot}, which no hardware worker serves.")
             time = hardware_time(self.board.profile, name, timing, self.board.slots[slot].clock_hz)
-            self._register(name, kind, source, check).slots[slot] = (thread, time)
+            self._register(name, kind, source, check).slots[slot] = (
+                thread,
+                time,
+                _limit(name, limit_ms),
+            )
 
     def spin(self) -> None:
         """Load the bitstreams, open every source and start the workers.
@@ -144,8 +154,8 @@ class Executor:
         board.zycap.init(read_bitstreams(self._bitstreams, wanted.values()) if self._bitstreams else wanted)
         for name, registration in self._registrations.items():
             slots = {
-                slot: HardwareImplementation(board.zycap.bitstream(slot, name), thread, time)
-                for slot, (thread, time) in registration.slots.items()
+                slot: HardwareImplementation(board.zycap.bitstream(slot, name), *implementation)
+                for slot, implementation in registration.slots.items()
             }
             entry = CallbackEntry(
                 name,
@@ -182,7 +192,8 @@ class Executor:
         """Note that the callback raised: it is logged and counted, and the sender of a request is told."""
         name = dispatch.entry.name
         self.failures[name] += 1
-        _log.error("callback %s failed", name, exc_info=error)
+        spans = ", ".join(f"{stage} {ns / 1e6:g} ms" for stage, ns in event.timeline.stages_ns.items() if ns)
+        _log.error("callback %s failed after %s", name, spans or "0 ms", exc_info=error)
         if event.responder is not None:
             event.responder.fail(f"callback {name} failed: {error}")
         self._finish(dispatch)
@@ -234,3 +245,11 @@ class Executor:
     def _wake(self, entry: CallbackEntry) -> None:
         for worker in self._workers_of[entry.name]:
             worker.wake()
+
+
+def _limit(callback: str, limit_ms: float | None) -> Limit | None:
+    if limit_ms is None:
+        return None
+    if not 0 < limit_ms < math.inf:
+        raise UsageError(f"limit_ms={limit_ms} of callback {callback!r}: write a time above 0.")
+    return Limit(callback, round(limit_ms * 1e6))

@@ -255,7 +255,7 @@ class HmtSource:
         streamed = self._fifo.take()
         timeline = streamed.timeline.fork()
         timeline.mark("hmt")
-        return Event(streamed.message, timeline, in_slot=True)
+        return Event(streamed.message, timeline, message_type=self._topic.type, in_slot=True)
 
     def answer(self, event: Event, response: object) -> None:
         """Do nothing: what a subscriber's callback returns goes nowhere."""

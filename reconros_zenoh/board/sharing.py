@@ -64,7 +64,13 @@ class SharedResource:
         job = _Job(work, self._environment.now, self._per_job if limit is None else limit, first=first)
         self._jobs.append(job)
         self._share(job)
-        yield job
+        try:
+            yield job
+        except Exception:  # the caller is stopped
+            job.due_ns = None
+            self._jobs.remove(job)
+            self._share()
+            raise
 
     @property
     def is_saturated(self) -> bool:

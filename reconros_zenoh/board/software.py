@@ -12,6 +12,7 @@ if TYPE_CHECKING:
 
     from reconros_zenoh.board.actions import ActionClientSource
     from reconros_zenoh.board.board import Board
+    from reconros_zenoh.board.host import Limit
     from reconros_zenoh.board.os_resources import Condition, Mailbox, Mutex, Semaphore
     from reconros_zenoh.board.spans import Timeline
     from reconros_zenoh.board.timing import ExecutionTime
@@ -25,10 +26,11 @@ SoftwareCallback: TypeAlias = "Callable[[Any, SoftwareContext], object]"
 
 @dataclass(frozen=True, slots=True)
 class SoftwareImplementation:
-    """What fills the software field of a ResourceMask: the function, and how long it computes."""
+    """What fills the software field of a ResourceMask: the function, and how long it takes."""
 
     function: SoftwareCallback
     time: ExecutionTime
+    limit: Limit | None
 
 
 class Outlet(Protocol):

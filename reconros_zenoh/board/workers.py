@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, cast
 from reconros_zenoh.board.callback import HardwareThread, ThreadExit
 from reconros_zenoh.board.host import measured
 from reconros_zenoh.board.software import SoftwareContext
-from reconros_zenoh.clock.activity import Activity
+from reconros_zenoh.clock.activity import Activity, Signal, limited
 from reconros_zenoh.executor.resource_mask import SOFTWARE
 
 if TYPE_CHECKING:
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from reconros_zenoh.board.callback import HardwareImplementation
     from reconros_zenoh.board.endpoints import Event
     from reconros_zenoh.board.executor import Executor
+    from reconros_zenoh.board.host import Limit
     from reconros_zenoh.board.slots import ReconfigurableSlot
     from reconros_zenoh.board.software import SoftwareImplementation
     from reconros_zenoh.clock.activity import Awaitable
@@ -67,6 +68,16 @@ class Worker(ABC):
             if dispatch is not None:
                 return dispatch
 
+    def _within(
+        self, limit: Limit | None, steps: Generator[Awaitable, object, object]
+    ) -> Generator[Awaitable, object, object]:
+        """Go through the steps of a callback, for as long as it may take."""
+        if limit is None:
+            return steps
+        deadline = Signal()
+        self._environment.call_later(limit.ns, deadline.fire)
+        return limited(steps, deadline, limit.error)
+
     @abstractmethod
     def _execute(self, dispatch: Dispatch, event: Event) -> Generator[Awaitable, object, object]:
         """Run the callback to completion and return what it returned."""
@@ -85,7 +96,9 @@ class SoftwareWorker(Worker):
         implementation = cast("SoftwareImplementation", dispatch.implementation)
         context = SoftwareContext(board, dispatch.entry.name, implementation.time)
         try:
-            response = yield from self._run_function(implementation, event, context)
+            response = yield from self._within(
+                implementation.limit, self._run_function(implementation, event, context)
+            )
         finally:
             context.release_mutexes()
         for send in context.sends:
@@ -96,19 +109,21 @@ class SoftwareWorker(Worker):
         self, implementation: SoftwareImplementation, event: Event, context: SoftwareContext
     ) -> Generator[Awaitable, object, object]:
         board, timeline, time = self._board, event.timeline, implementation.time
-        function, host = implementation.function, self._board.host
+        function, limit, host = implementation.function, implementation.limit, self._board.host
         if time.ns is not None:
-            future = host.start(function, function, event.message, context)
+            future = host.start(function, function, event.message, context, limit=limit)
             yield from board.cpu.run(time.ns)
             timeline.mark("execution")
             response = yield from host.late_result(future)
             timeline.mark("overrun")
         elif not time.modelled:
-            response = yield from host.result(host.start(function, function, event.message, context))
+            response = yield from host.result(
+                host.start(function, function, event.message, context, limit=limit)
+            )
             timeline.mark("execution")
         else:
             started_ns = self._environment.now
-            future_and_time = host.start(function, measured, function, event.message, context)
+            future_and_time = host.start(function, measured, function, event.message, context, limit=limit)
             response, took_ns = yield from host.result(future_and_time)
             left_ns = round(took_ns * time.factor) - (self._environment.now - started_ns)
             yield from board.cpu.run(max(0, left_ns))
@@ -131,10 +146,10 @@ class HardwareWorker(Worker):
         yield from board.zycap.write_bitstream(self._slot, implementation.bitstream)
         timeline.mark("reconfiguration")
         started_ns = self._environment.now
-        thread = HardwareThread(board, dispatch.entry.name, self._slot, event, implementation.time)
+        thread = HardwareThread(board, dispatch.entry.name, self._slot, event, implementation)
         try:
             try:
-                response = yield from implementation.callback(thread)
+                response = yield from self._within(implementation.limit, implementation.callback(thread))
             except ThreadExit as end:
                 response = end.response
             if event.responder is not None:

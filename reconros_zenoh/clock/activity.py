@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, TypeAlias, cast
+from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar, cast
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator
 
     import simpy
+
+
+R = TypeVar("R")
 
 
 class Signal:
@@ -32,6 +35,46 @@ class Signal:
 
 Awaitable: TypeAlias = "simpy.Event | Signal"
 """What a process may yield to wait for it."""
+
+
+def limited(
+    steps: Generator[Awaitable, Any, R], deadline: Signal, error: Callable[[], Exception]
+) -> Generator[Awaitable, Any, R]:
+    """Return what the steps return; when the deadline happens before they end, raise the error in them.
+
+    Steps that never wait cannot be stopped.
+    """
+    try:
+        waited_for = next(steps)
+        while True:
+            if waited_for.callbacks is not None and deadline.callbacks is not None:
+                yield _first(waited_for, deadline)
+                if deadline.callbacks is None and waited_for.callbacks is not None:
+                    waited_for = steps.throw(error())
+                    continue
+            elif waited_for.callbacks is not None:
+                yield waited_for
+            if waited_for.ok:
+                waited_for = steps.send(waited_for.value)
+            else:
+                cast("simpy.Event", waited_for).defused = True
+                waited_for = steps.throw(cast("BaseException", waited_for.value))
+    except StopIteration as end:
+        return cast("R", end.value)
+
+
+def _first(event: Awaitable, deadline: Signal) -> Signal:
+    """Return a signal that fires when one of the two happens, neither of which has."""
+    first = Signal()
+
+    def happen(_: object) -> None:
+        if first.callbacks is not None:
+            first.fire()
+
+    assert event.callbacks is not None
+    event.callbacks.append(happen)
+    deadline.callbacks = [happen]
+    return first
 
 
 class Activity:

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from concurrent.futures import Future
 
     from reconros_zenoh.board.cpu import Cpu
+    from reconros_zenoh.board.host import Limit
     from reconros_zenoh.board.profile import Model, Profile
     from reconros_zenoh.board.spans import Stage
     from reconros_zenoh.clock.activity import Awaitable
@@ -249,10 +250,12 @@ class _WatchedHost(Host):
         self._watch = watch
         self._started_ns = 0
 
-    def start(self, task: object, function: Callable[..., Any], *arguments: object) -> Any:
+    def start(
+        self, task: object, function: Callable[..., Any], *arguments: object, limit: Limit | None = None
+    ) -> Any:
         """Start a computation, see `Host.start`."""
         self._started_ns = time.monotonic_ns()
-        return super().start(task, function, *arguments)
+        return super().start(task, function, *arguments, limit=limit)
 
     def late_result(self, future: Future[Any] | Any) -> Generator[Awaitable, object, Any]:
         """Return the result of a callback's computation, see `Host.late_result`."""

@@ -87,6 +87,10 @@ def finish(plan: Plan, report: BoardReport, *, interrupted: bool) -> dict[str, A
         **experiment_tables(_records(plan)),
         "host": report.host(),
         "spans": {mapping: status["spans_ms"] for mapping, status in report.statuses.items()},
+        "timing": {
+            mapping: {name: callback["timing"] for name, callback in status["callbacks"].items()}
+            for mapping, status in report.statuses.items()
+        },
         "rejected": {mapping: status["rejected"] for mapping, status in report.statuses.items()},
         "interrupted": interrupted,
         "profile": plan.profile,

@@ -163,6 +163,14 @@ def write_histograms(path: Path, pairs: Sequence[tuple[NamedRecord, NamedRecord 
     _save(figure, path, ("png",))
 
 
+def draw_histogram(axes: Axes, record: Record, edges_ms: npt.NDArray[np.float64], title: str) -> None:
+    """Draw the record's histogram with its mean, and its median above it."""
+    with _style():
+        _panel(axes, edges_ms, record, None, _MAPPING_COLOURS[1])
+        axes.set_title(f"{_wrap(title, 42)}\n", loc="left", fontweight="bold")
+        axes.set_title(_medians(record, "other", None), loc="right", fontsize=8)
+
+
 def inline_svg(figure: Figure) -> str:
     """Return the figure as an SVG element for an HTML page, without references to the outside.
 

@@ -247,6 +247,12 @@ def _origin(experiment: Mapping[str, Any]) -> str:
         if key in experiment
     }
     shown |= {f"version of {name}": version for name, version in experiment.get("versions", {}).items()}
+    for mapping, callbacks in experiment.get("timing", {}).items():
+        shown[f"times of callbacks: {mapping}"] = ", ".join(
+            f"{name} in {place} from {time['basis']}"
+            for name, places in callbacks.items()
+            for place, time in places.items()
+        )
     shown |= {f"host: {key}": value for key, value in experiment["host"].items()}
     rows = "".join(
         f"<tr><td>{escape(key)}</td><td>{escape(str(value))}</td></tr>" for key, value in shown.items()

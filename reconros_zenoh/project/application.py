@@ -77,8 +77,8 @@ class Application:
         `action_client` returns.
         """
         resource = self._resource(group, name)
-        if qos is not None and resource.type != "rossub":
-            raise UsageError(f"resource {name!r} of group {group!r} is a {resource.type}: its QoS is fixed.")
+        if resource.type != "rossub" or resource.hardware_mapped:
+            _refuse_qos(resource, qos)
         match resource.type:
             case "rossub":
                 return self._subscription(resource, qos)
@@ -150,6 +150,7 @@ class Application:
         """Return the publisher of that name; without `qos` reliable, volatile, the last 10."""
         resource = self._resource_of(group, name, "rospub")
         if resource.hardware_mapped:
+            _refuse_qos(resource, qos)
             return HmtWriter(self._hardware_topic(resource))
         return self.board.writer(
             self._node(resource),
@@ -208,13 +209,15 @@ class Application:
         check: Callable[[Any], None] | None = None,
         software_timing: Timing | None = None,
         hardware_timing: Timing | None = None,
+        limit_ms: float | None = None,
         qos: QosProfile | None = None,
     ) -> None:
         """Let the callback `name` of build.cfg run where the mapping wants it, whenever `resource` is ready.
 
         That is a subscription, service, action, client or timer of its resource groups; `check` raises
         BadMessageError for bad messages; the timings say how long it takes where the profile's table does
-        not; `qos` is as in `source`. The executor is the one that the mapping describes; `spin` starts it.
+        not; `limit_ms` is the longest that a call may take; `qos` is as in `source`. The executor is the one
+        that the mapping describes; `spin` starts it.
         """
         threads = {thread.name: thread for thread in self.project.configuration.threads}
         if name not in threads:
@@ -238,14 +241,16 @@ class Application:
                     f"callback {name!r} is mapped to software, but no `software` is given. Give it, or "
                     "map the callback to reconfigurable slots."
                 )
-            executor.add_sw_callback(name, kind, source, software, check, software_timing)
+            executor.add_sw_callback(name, kind, source, software, check, software_timing, limit_ms)
         if place.slots:
             if hardware is None:
                 raise UsageError(
                     f"callback {name!r} is mapped to hardware, but no `hardware` is given. Give it, or "
                     "map the callback to software."
                 )
-            executor.add_hw_callback(name, place.slots, kind, source, hardware, check, hardware_timing)
+            executor.add_hw_callback(
+                name, place.slots, kind, source, hardware, check, hardware_timing, limit_ms
+            )
 
     def spin(self, executor: Executor | None = None) -> None:
         """Start the gateways and the workers of an executor of one's own or of the one `register` has filled.
@@ -317,6 +322,14 @@ class Application:
             namespace, _, base = name.rpartition("/")
             self._nodes[name] = self.board.context.node(base, namespace or "/")
         return self._nodes[name]
+
+
+def _refuse_qos(resource: Resource, qos: QosProfile | None) -> None:
+    if qos is not None:
+        kind = "hardware-mapped topic" if resource.hardware_mapped else resource.type
+        raise UsageError(
+            f"resource {resource.name!r} of group {resource.group!r} is a {kind}: its QoS is fixed."
+        )
 
 
 def _required(value: T | None) -> T:

@@ -31,7 +31,7 @@ def one_failure(caplog: pytest.LogCaptureFixture, callback: str, error: type[Exc
     """The text of the one record, which has the traceback."""
     (record,) = caplog.records
     assert record.levelno == logging.ERROR
-    assert record.getMessage() == f"callback {callback} failed"
+    assert record.getMessage().startswith(f"callback {callback} failed after ")
     assert record.exc_info is not None
     assert record.exc_info[0] is error
     assert record.exc_info[2] is not None

@@ -13,6 +13,7 @@ from reconros_zenoh.board.board import Board
 from reconros_zenoh.board.control import status
 from reconros_zenoh.board.executor import Executor
 from reconros_zenoh.board.hmt import Fifo, FifoPlan, HmtSource, HmtWriter
+from reconros_zenoh.board.kernel import Kernel
 from reconros_zenoh.board.profile import read_profile
 from reconros_zenoh.board.spans import Timeline
 from reconros_zenoh.errors import BadMessageError, UsageError
@@ -250,3 +251,34 @@ def test_the_status_counts_what_passed() -> None:
     stream.environment.run()
     shown = msgpack.unpackb(msgpack.packb(status(stream.board, Executor(stream.board, 1, 0))))
     assert shown["hmt"] == {"hmt/board0/a": {"passed": 2, "dropped": 1, "waits": 0}}
+
+
+def test_pointers_and_plain_kernels_work_on_a_stream_as_well() -> None:
+    def walk(hardware: Any) -> Steps:
+        pointer = yield from hardware.get_init_data()
+        pointer = yield from hardware.mem_read(pointer + hardware.offsetof(words, "data.data"), 4)
+        walked.append((yield from hardware.mem_read(pointer[0], 84, np.uint8)))
+
+    def double(data: Any) -> Any:
+        return 2 * data
+
+    walked: list[Any] = []
+    board = small_board(small_profile({"walk": (0, 0), "kernel": (0, 0)}), slots=2)
+    into, out = board.hardware_topic("/in", words), board.hardware_topic("/out", words)
+    arrived = Fifo(FifoPlan(), lambda: None, None, cut_through=False)
+    out.subscribe(arrived)
+    kernel = Kernel(
+        double, ("data",), lambda _, data: words.cls(layout=layout, data=data), publish=HmtWriter(out)
+    )
+    executor = Executor(board, 0, 2)
+    for slot, (name, callback) in enumerate({"walk": walk, "kernel": kernel}.items()):
+        source = HmtSource(board, into, FifoPlan())
+        executor.add_hw_callback(name, [slot], CallbackKind.SUB, source, callback)
+    executor.spin()
+    body = words.cls(layout=layout, data=np.arange(84, dtype=np.uint8))
+    start(board.environment, into.publish("p", body, Timeline(board.environment, 0)))
+    board.environment.run()
+    assert walked[0].tolist() == body.data.tolist()
+    assert arrived.take().message.data.tolist() == (2 * body.data).tolist()
+    assert board.memif.transferred_bytes == 0
+    assert executor.failures == {}

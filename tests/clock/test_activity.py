@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from reconros_zenoh.clock.activity import Activity, Signal
+from reconros_zenoh.clock.activity import Activity, Signal, limited
 from reconros_zenoh.clock.virtual import VirtualEnvironment
 
 if TYPE_CHECKING:
@@ -154,3 +154,64 @@ def test_ten_thousand_events_that_have_happened_are_no_recursion() -> None:
 
     Activity(work())
     assert len(log) == 10_000
+
+
+def failing(environment: VirtualEnvironment) -> Any:
+    """An event that fails after 5 ns."""
+    event = environment.event()
+    environment.call_later(5, event.fail, KeyError("it"))
+    return event
+
+
+@pytest.mark.parametrize(
+    ("wait", "limit_ns", "outcome"),
+    [
+        (lambda environment: environment.timeout(5, "value"), 10, (5, "value")),
+        (lambda environment: environment.timeout(15, "value"), 10, (10, "stopped")),
+        (failing, 10, (5, "'it'")),
+        (lambda _: Signal(), 10, (10, "stopped")),
+    ],
+)
+def test_steps_that_may_take_so_long(wait: Any, limit_ns: int, outcome: tuple[int, str]) -> None:
+    environment = VirtualEnvironment()
+    told: list[tuple[int, Any]] = []
+
+    def steps() -> Any:
+        try:
+            return (yield wait(environment))
+        except Exception as error:  # noqa: BLE001 - whatever it is
+            return str(error)
+
+    def run() -> Any:
+        deadline = Signal()
+        environment.call_later(limit_ns, deadline.fire)
+        value = yield from limited(steps(), deadline, lambda: ValueError("stopped"))
+        told.append((environment.now, value))
+
+    Activity(run())
+    environment.run(until=100)
+    assert told == [outcome]
+
+
+def test_stopped_steps_may_wait_once_more_before_they_end() -> None:
+    environment = VirtualEnvironment()
+    ended: list[int] = []
+
+    def steps() -> Any:
+        try:
+            yield Signal()
+        finally:
+            yield environment.timeout(7)
+            ended.append(environment.now)
+
+    def run() -> Any:
+        deadline = Signal()
+        environment.call_later(10, deadline.fire)
+        try:
+            yield from limited(steps(), deadline, lambda: ValueError("stopped"))
+        except ValueError:
+            ended.append(environment.now)
+
+    Activity(run())
+    environment.run(until=100)
+    assert ended == [17, 17]

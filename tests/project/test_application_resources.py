@@ -49,6 +49,8 @@ flip = rossrvmsg, std_srvs, srv, SetBool
 fibonacci = rosactionmsg, example_interfaces, action, Fibonacci
 sub = rossub, node, word, "in"
 pub = rospub, node, word, "out"
+stream_in = rossub, node, std_msgs/UInt32, "stream", hw
+stream_out = rospub, node, std_msgs/UInt32, "stream", hw
 ask = rossrvc, node, flip, "flip"
 act = rosactions, node, fibonacci, "serve"
 want = rosactionc, node, fibonacci, "want"
@@ -123,6 +125,9 @@ def test_the_qos_of_a_topic_is_chosen_that_of_others_is_fixed(app: Application) 
     assert sum(token.endswith(f"/{qos.encode()}") for token in tokens) == 2
     with pytest.raises(UsageError, match="'act' of group 'ros' is a rosactions: its QoS is fixed"):
         app.source("ros", "act", qos)
+    for end, name in ((app.source, "stream_in"), (app.writer, "stream_out")):
+        with pytest.raises(UsageError, match="is a hardware-mapped topic: its QoS is fixed"):
+            end("ros", name, qos)
 
 
 def test_a_resource_of_another_type(app: Application) -> None:

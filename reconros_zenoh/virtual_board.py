@@ -1,0 +1,199 @@
+"""An emulated board in virtual time within this process: for notebooks, tests and first steps."""
+
+from __future__ import annotations
+
+from itertools import count
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from board_daemon.hosting import BoardOptions, HostedBoard
+from reconros_zenoh.board.actions import ActionClientSource, ActionSource
+from reconros_zenoh.board.board import Board, SlotPlan
+from reconros_zenoh.board.clients import ClientSource
+from reconros_zenoh.board.control import status
+from reconros_zenoh.board.endpoints import ServiceSource, SubscriptionSource, TimerSource
+from reconros_zenoh.board.executor import Executor
+from reconros_zenoh.board.profile import read_profile
+from reconros_zenoh.clock.virtual import VirtualEnvironment, succeed_once
+from reconros_zenoh.project.loader import load_project
+from reconros_zenoh.rmw.node import Context
+from reconros_zenoh.ros.types import TypeRegistry
+from reconros_zenoh.transport.simulated import SimulatedNetwork
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from numpy.typing import NDArray
+
+    from reconros_zenoh.board.endpoints import TopicWriter
+    from reconros_zenoh.board.profile import Profile
+    from reconros_zenoh.ros.qos import QosProfile
+
+_SECOND_NS = 1_000_000_000
+_SLOT = SlotPlan(0, 20800, 160, 60)  # RS #0 of ReconROS Executor, Table II
+
+
+class VirtualDesktop:
+    """A network in virtual time with a node on the desktop: what a virtual board and a project share.
+
+    `types` knows the message types, `desktop` is a node that publishes to the board and hears from it. Not
+    thread-safe; nothing happens but in `run` and `round_trips`.
+    """
+
+    def __init__(self, types: TypeRegistry) -> None:
+        self.types = types
+        self.environment = VirtualEnvironment()
+        self._network = SimulatedNetwork(self.environment)
+        self._sessions = count(1)
+        self.desktop = self._context().node("desktop")
+
+    @property
+    def now_ms(self) -> float:
+        """The present virtual time [ms]."""
+        return self.environment.now / 1e6
+
+    def run(self, seconds: float) -> None:
+        """Let so many seconds of virtual time pass."""
+        self.environment.run(until=self.environment.now + round(seconds * _SECOND_NS))
+
+    def listen(self, topic: str, type_name: str) -> list[Any]:
+        """Return a list to which each message that is published on the topic from now on is appended."""
+        messages: list[Any] = []
+        self.desktop.subscription(
+            self.types.message(type_name), topic, lambda received: messages.append(received.message)
+        )
+        return messages
+
+    def round_trips(
+        self,
+        requests: tuple[str, str],
+        answers: tuple[str, str],
+        messages: Iterable[dict[str, Any]],
+        limit_s: float = 2.0,
+    ) -> NDArray[np.float64]:
+        """Return the time [ms] from each message to its answer; the next leaves when the answer is in.
+
+        `requests` and `answers` are topic and type name; a message is given by its fields. An answer that
+        does not come within `limit_s` is NaN.
+        """
+        request_type = self.types.message(requests[1])
+        publisher = self.desktop.publisher(request_type, requests[0])
+        arrived = self.environment.event()
+        subscription = self.desktop.subscription(
+            self.types.message(answers[1]), answers[0], lambda _: succeed_once(arrived)
+        )
+        times_ms = []
+        for fields in messages:
+            arrived = self.environment.event()
+            sent_ns = self.environment.now
+            limit = self.environment.timeout(round(limit_s * _SECOND_NS))
+            publisher.publish(request_type.cls(**fields))
+            self.environment.run(until=arrived | limit)
+            times_ms.append((self.environment.now - sent_ns) / 1e6 if arrived.triggered else np.nan)
+        subscription.close()
+        publisher.close()
+        return np.array(times_ms)
+
+    def _context(self) -> Context:
+        transport = self._network.transport(f"{next(self._sessions):x}")
+        return Context(transport, clock_ns=self.environment.clock_ns)
+
+
+class VirtualBoard(VirtualDesktop):
+    """An emulated board without a project: endpoints by name, callbacks of this program.
+
+    `profile` is the name of a kind of board or a file; the board has so many `slots`, each as large as RS #0
+    of the paper. Callbacks are added to `executor`, then `executor.spin()` starts it, as in Listing 4 of
+    ReconROS Executor, Section IV.
+    """
+
+    def __init__(
+        self,
+        profile: str | Profile = "native",
+        *,
+        slots: int = 0,
+        software_workers: int = 2,
+        hardware_workers: int | None = None,
+        seed: int = 0,
+    ) -> None:
+        super().__init__(TypeRegistry())
+        self.board = Board(
+            self.environment,
+            self._context(),
+            read_profile(profile) if isinstance(profile, str) else profile,
+            tuple(SlotPlan(slot, _SLOT.lut, _SLOT.dsp, _SLOT.bram36) for slot in range(slots)),
+            seed=seed,
+        )
+        self.executor = Executor(
+            self.board, software_workers, slots if hardware_workers is None else hardware_workers
+        )
+        self._node = self.board.context.node(self.board.name)
+
+    def subscription(
+        self, topic: str, type_name: str, qos: QosProfile | None = None, *, in_hardware: bool = False
+    ) -> SubscriptionSource:
+        """Return a subscription of the board; `in_hardware` says that its callback runs in slots."""
+        message_type = self.types.message(type_name)
+        return SubscriptionSource(self.board, self._node, message_type, topic, qos, in_hardware=in_hardware)
+
+    def publisher(self, topic: str, type_name: str, qos: QosProfile | None = None) -> TopicWriter:
+        """Return a publisher of the board."""
+        return self.board.writer(self._node, self.types.message(type_name), topic, qos)
+
+    def timer(self, period_ms: float) -> TimerSource:
+        """Return a timer of the board."""
+        return TimerSource(self.board, round(period_ms * 1e6))
+
+    def service(self, name: str, type_name: str) -> ServiceSource:
+        """Return a service server of the board."""
+        return ServiceSource(self.board, self._node, self.types.service(type_name), name)
+
+    def client(self, name: str, type_name: str) -> ClientSource:
+        """Return a service client of the board."""
+        return ClientSource(self.board, self._node, self.types.service(type_name), name)
+
+    def action(self, name: str, type_name: str) -> ActionSource:
+        """Return an action server of the board."""
+        return ActionSource(self.board, self._node, self.types.action(type_name), name)
+
+    def action_client(self, name: str, type_name: str) -> ActionClientSource:
+        """Return an action client of the board."""
+        return ActionClientSource(self.board, self._node, self.types.action(type_name), name)
+
+    def status(self) -> dict[str, Any]:
+        """Return what the board has done so far, as `reconros status` shows it."""
+        return status(self.board, self.executor)
+
+
+class VirtualProject(VirtualDesktop):
+    """A ReconROS project on an emulated board; its callbacks are served as soon as time passes.
+
+    `mapping` is a name or a file; without one it is that of `reconros run`.
+    """
+
+    def __init__(
+        self,
+        folder: str | Path,
+        profile: str | Profile = "native",
+        *,
+        mapping: str | None = None,
+        seed: int = 0,
+    ) -> None:
+        project = load_project(Path(folder))
+        super().__init__(project.types())
+        self._hosted = HostedBoard(
+            self.environment,
+            self._context().transport,
+            read_profile(profile) if isinstance(profile, str) else profile,
+            project,
+            project.mapping(mapping),
+            BoardOptions(seed=seed),
+        )
+        self.board = self._hosted.board
+        self.executor = self._hosted.executor
+
+    def status(self) -> dict[str, Any]:
+        """Return what the board has done so far, as `reconros status` shows it."""
+        return status(self.board, self.executor)

@@ -1,0 +1,138 @@
+"""Boards in a few lines: what a notebook does."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+import reconros_zenoh as rz
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+WORD = "std_msgs/msg/UInt32"
+
+
+def doubling(board: rz.VirtualBoard, timing: Any = None) -> None:
+    """Add a software callback that publishes twice the number, unless it is odd."""
+    writer = board.publisher("/out", WORD)
+
+    def on_number(message: Any, ctx: rz.SoftwareContext) -> None:
+        if message.data % 2 == 0:
+            ctx.publish(writer, writer.message(data=2 * message.data))
+
+    board.executor.add_sw_callback(
+        "double", rz.SUB, board.subscription("/in", WORD), on_number, timing=timing
+    )
+    board.executor.spin()
+
+
+def numbers(*values: int) -> list[dict[str, int]]:
+    return [{"data": value} for value in values]
+
+
+def test_messages_go_to_the_board_and_come_back() -> None:
+    board = rz.VirtualBoard()
+    doubling(board)
+    heard = board.listen("/out", WORD)
+    times_ms = board.round_trips(("/in", WORD), ("/out", WORD), numbers(2, 3, 4), limit_s=0.5)
+    assert [message.data for message in heard] == [4, 8]
+    assert times_ms.tolist()[::2] == [0, 0]
+    assert np.isnan(times_ms[1])
+    assert board.now_ms == 500
+    assert board.status()["callbacks"]["double"]["calls"] == 3
+
+
+def test_a_modelled_board_takes_its_time_and_repeats_itself() -> None:
+    times = []
+    for _ in range(2):
+        board = rz.VirtualBoard("miniitx-zynq7100", seed=3)
+        doubling(board, rz.Cycles(666_000))  # one millisecond of a core at 666 MHz
+        times.append(board.round_trips(("/in", WORD), ("/out", WORD), numbers(2, 2, 2)))
+    assert times[0].tolist() == times[1].tolist()
+    assert (times[0] > 1).all()
+    assert board.status()["callbacks"]["double"]["timing"] == {"software": {"basis": "cycles", "ms": 1.0}}
+
+
+def test_a_hardware_callback_on_a_timer() -> None:
+    board = rz.VirtualBoard("miniitx-zynq7100", slots=1, software_workers=0)
+    writer = board.publisher("/tick", WORD)
+
+    def tick(thread: rz.HardwareThread) -> Any:
+        count = yield from thread.compute(int)
+        yield from thread.publish(writer, writer.message(data=count))
+
+    board.executor.add_hw_callback("tick", [0], rz.TMR, board.timer(100), tick, timing=rz.Cycles(100))
+    board.executor.spin()
+    heard = board.listen("/tick", WORD)
+    board.run(1.05)
+    assert len(heard) == 10
+    assert board.status()["slots"][0]["reconfigurations"] == 1
+
+
+def test_two_callbacks_talk_through_service_and_action() -> None:
+    board = rz.VirtualBoard()
+    flip, flipped = board.service("/flip", "std_srvs/SetBool"), board.client("/flip", "std_srvs/SetBool")
+    fibonacci = board.action("/fibonacci", "example_interfaces/Fibonacci")
+    wanted = board.action_client("/fibonacci", "example_interfaces/Fibonacci")
+    answer = board.types.service("std_srvs/SetBool").response.cls
+    heard: list[Any] = []
+
+    def on_start(_: None, ctx: rz.SoftwareContext) -> None:
+        ctx.call(flipped, flipped.request(data=True))
+        ctx.send_goal(wanted, wanted.goal(order=1))
+
+    add = board.executor.add_sw_callback
+    add("start", rz.TMR, board.timer(1), on_start)
+    add("flip", rz.SRV, flip, lambda request, _: answer(success=not request.data, message="no"))
+    add("flipped", rz.CLT, flipped, lambda response, _: heard.append(response.message))
+    add("serve", rz.SRV, fibonacci, lambda _, __: fibonacci.result(sequence=np.zeros(1, np.int32)))
+    add("hear", rz.CLT, wanted, lambda event, _: heard.append((event.kind, event.status)))
+    board.executor.spin()
+    board.run(0.0015)
+    assert "no" in heard
+    assert ("result", rz.GoalStatus.SUCCEEDED) in heard
+
+
+BUILD_CFG = """
+[General]
+Name = small
+[ResourceGroup@echo]
+node = rosnode, "/echo"
+word = rosmsg, std_msgs, msg, UInt32
+sub = rossub, node, word, "/in"
+pub = rospub, node, word, "/out"
+[ReconosThread@echo]
+SwSource = python
+ResourceGroup = echo
+"""
+MAIN = """
+import reconros_zenoh as rz
+
+def main(app: rz.Application) -> None:
+    pub = app.writer("echo", "pub")
+    app.register("echo", "sub", software=lambda msg, ctx: ctx.publish(pub, msg), software_timing=rz.Cycles(9))
+    app.spin()
+"""
+
+
+def test_a_project_folder(tmp_path: Path) -> None:
+    (tmp_path / "build.cfg").write_text(BUILD_CFG)
+    (tmp_path / "main.py").write_text(MAIN)
+    project = rz.VirtualProject(tmp_path, "miniitx-zynq7100")
+    times_ms = project.round_trips(("/in", WORD), ("/out", WORD), numbers(1, 2, 3))
+    assert not np.isnan(times_ms).any()
+    assert project.status()["callbacks"]["echo"]["calls"] == 3
+
+
+def test_a_histogram_is_a_picture() -> None:
+    figure = rz.histogram([1.0, 2.0, np.nan, 2.5], "three times")
+    assert figure._repr_png_().startswith(b"\x89PNG")  # type: ignore[attr-defined]
+    assert "three times" in figure.axes[0].get_title(loc="left")
+
+
+def test_a_histogram_of_nothing() -> None:
+    with pytest.raises(rz.UsageError, match="Measure some first"):
+        rz.histogram([np.nan])
