@@ -31,6 +31,7 @@ from reconros_zenoh.executor.callbacks import CallbackKind
 from reconros_zenoh.experiments.gateway import Cell, Times, Variant, host, setup_mapping
 from reconros_zenoh.experiments.wall import free_port
 from reconros_zenoh.project.loader import load_project
+from reconros_zenoh.project.mapping_file import CallbackMapping
 from reconros_zenoh.rmw.node import Context
 from reconros_zenoh.ros.types import TypeRegistry
 from reconros_zenoh.transport.memory import tune_memory
@@ -43,6 +44,7 @@ if TYPE_CHECKING:
     from reconros_zenoh.board.callback import HardwareThread
     from reconros_zenoh.clock.activity import Awaitable
     from reconros_zenoh.project.application import Application
+    from reconros_zenoh.project.mapping_file import Mapping as CallbackPlaces
 
 COPIES = [
     (
@@ -290,7 +292,7 @@ def _run_board(connection: Connection, router: str, variant: Variant, count: int
             transport,
             read_profile("native"),
             replace(project, main=partial(_run_hardware_nodes, receiver)),
-            setup_mapping("software", count),
+            _hardware_only(setup_mapping("software", count)),
             BoardOptions(),
         )
 
@@ -307,8 +309,14 @@ def _run_board(connection: Connection, router: str, variant: Variant, count: int
             hosted.close()
 
 
+def _hardware_only(mapping: CallbackPlaces) -> CallbackPlaces:
+    """Return the mapping without its software nodes, which have processes of their own."""
+    places = {name: place if place.slots else CallbackMapping() for name, place in mapping.callbacks.items()}
+    return mapping.model_copy(update={"callbacks": places})
+
+
 def _run_hardware_nodes(receiver: Receiver, app: Application) -> None:
-    """Register the hardware nodes and spin; the nodes in software have processes of their own."""
+    """Register the hardware nodes and spin."""
     executor = Executor(app.board, app.mapping.software_workers, app.mapping.hardware_workers)
     for name, place in app.mapping.callbacks.items():
         if place.slots:
