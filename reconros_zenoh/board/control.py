@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from contextlib import closing
 from queue import SimpleQueue
 from threading import Event
@@ -13,7 +14,10 @@ from reconros_zenoh.clock.wall import WallEnvironment
 from reconros_zenoh.errors import TransportError, UsageError
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from reconros_zenoh.board.board import Board
+    from reconros_zenoh.board.endpoints import TopicWriter
     from reconros_zenoh.board.executor import Executor
     from reconros_zenoh.transport.base import Declaration, Reply, Request, Transport
 
@@ -84,6 +88,7 @@ def status(board: Board, executor: Executor) -> dict[str, Any]:
             }
             for slot in board.slots.values()
         ],
+        "publishers": _dropped(board.writers),
         "gateways": gateways(board),
         "hmt": {
             topic.key: {"passed": topic.passed, "dropped": topic.dropped, "waits": topic.waits}
@@ -98,6 +103,13 @@ def status(board: Board, executor: Executor) -> dict[str, Any]:
             "lag_p99_us": lag.p99_us if lag else None,
         },
     }
+
+
+def _dropped(writers: Iterable[TopicWriter]) -> dict[str, dict[str, int]]:
+    topics: Counter[str] = Counter()
+    for writer in writers:
+        topics[writer.topic] += writer.dropped
+    return {topic: {"dropped": dropped} for topic, dropped in topics.items()}
 
 
 def gateways(board: Board) -> list[dict[str, Any]]:

@@ -73,6 +73,7 @@ def test_the_status_of_a_board() -> None:
             {"id": 0, "holds": "a", "reconfigurations": 1, "reconfiguration_ms": 0.001, "busy_ms": 4.0},
             {"id": 1, "holds": None, "reconfigurations": 0, "reconfiguration_ms": 0.0, "busy_ms": 0.0},
         ],
+        "publishers": {},
         "gateways": [],
         "hmt": {},
         "spans_ms": {},
