@@ -32,7 +32,8 @@ class Event:
     """What a worker takes: the message of the callback (None for a timer) and its timeline so far.
 
     `message_type` is None for what has no place in memory as a C struct. `in_slot`: it came over a
-    hardware-mapped topic, so a slot need not read it from main memory.
+    hardware-mapped topic, so a slot need not read it from main memory. `lasting`: how long its callback takes
+    depends on other events, as that of a goal on being canceled.
     """
 
     message: Any
@@ -40,6 +41,7 @@ class Event:
     responder: Responder | None = None
     message_type: MessageType | None = None
     in_slot: bool = False
+    lasting: bool = False
 
 
 class Source(Protocol):
