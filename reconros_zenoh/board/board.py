@@ -90,6 +90,7 @@ class Board:
         self.host = Host(environment, threads, IN_LINE_NS if model else 10 * IN_LINE_NS)
         self.spans = Spans()
         self.topics = LocalTopics(self, model, model.topics) if model and model.topics else None
+        self.writers: list[TopicWriter] = []
         self.hardware_topics: dict[str, HardwareTopic] = {}
         self.gateways: list[Gateway] = []
         self._tap = tap
@@ -113,8 +114,11 @@ class Board:
     ) -> TopicWriter:
         """Return a new publisher on a software-mapped topic; `in_place` as in `LocalTopics.publish`."""
         if self.topics is None:
-            return TopicWriter(self, node, message_type, topic, qos)
-        return LocalTopicWriter(self, node, message_type, topic, self.topics, qos, in_place=in_place)
+            writer = TopicWriter(self, node, message_type, topic, qos)
+        else:
+            writer = LocalTopicWriter(self, node, message_type, topic, self.topics, qos, in_place=in_place)
+        self.writers.append(writer)
+        return writer
 
     def hardware_topic(self, name: str, message_type: MessageType) -> HardwareTopic:
         """Return the hardware-mapped topic of that absolute name, the same one each time.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from contextlib import closing
 from queue import SimpleQueue
 from threading import Event
@@ -13,7 +14,10 @@ from reconros_zenoh.clock.wall import WallEnvironment
 from reconros_zenoh.errors import TransportError, UsageError
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from reconros_zenoh.board.board import Board
+    from reconros_zenoh.board.endpoints import TopicWriter
     from reconros_zenoh.board.executor import Executor
     from reconros_zenoh.transport.base import Declaration, Reply, Request, Transport
 
@@ -27,11 +31,21 @@ def alive_key(board: str) -> str:
 
 
 def claim_name(transport: Transport, board: str) -> None:
-    """Raise UsageError when a board of this name is there already."""
-    if transport.tokens(alive_key(board), _ANSWER_NS):
+    """Take the name until the transport is closed; raise UsageError when another board has it.
+
+    Of several that ask at the same time one gets it. Each claims the name first and then looks: who sees an
+    owner, or a claim of a lower session id, gives way; the others have not looked yet when this one becomes
+    the owner, or see its claim.
+    """
+    claims, owners = f"reconros/{board}/claims/", f"reconros/{board}/owner/"
+    mine = claims + transport.session_id
+    transport.declare_token(mine)
+    tokens = transport.tokens(f"reconros/{board}/*/*", _ANSWER_NS)
+    if any(token.startswith(owners) or (token.startswith(claims) and token < mine) for token in tokens):
         raise UsageError(
             f"a board named {board!r} is running already. Stop it, or start this one with --name."
         )
+    transport.declare_token(owners + transport.session_id)
 
 
 class ControlServer:
@@ -84,6 +98,7 @@ def status(board: Board, executor: Executor) -> dict[str, Any]:
             }
             for slot in board.slots.values()
         ],
+        "publishers": _dropped(board.writers),
         "gateways": gateways(board),
         "hmt": {
             topic.key: {"passed": topic.passed, "dropped": topic.dropped, "waits": topic.waits}
@@ -98,6 +113,13 @@ def status(board: Board, executor: Executor) -> dict[str, Any]:
             "lag_p99_us": lag.p99_us if lag else None,
         },
     }
+
+
+def _dropped(writers: Iterable[TopicWriter]) -> dict[str, dict[str, int]]:
+    topics: Counter[str] = Counter()
+    for writer in writers:
+        topics[writer.topic] += writer.dropped
+    return {topic: {"dropped": dropped} for topic, dropped in topics.items()}
 
 
 def gateways(board: Board) -> list[dict[str, Any]]:

@@ -32,8 +32,9 @@ class Event:
     """What a worker takes: the message of the callback (None for a timer) and its timeline so far.
 
     `message_type` is None for what has no place in memory as a C struct. `in_slot`: it came over a
-    hardware-mapped topic, so a slot need not read it from main memory. `lasting`: how long its callback takes
-    depends on other events, as that of a goal on being canceled.
+    hardware-mapped topic, so a slot need not read it from main memory. `size` is that of a subscription's
+    message in bytes on the wire. `lasting`: how long its callback takes depends on other events, as that of a
+    goal on being canceled.
     """
 
     message: Any
@@ -41,6 +42,7 @@ class Event:
     responder: Responder | None = None
     message_type: MessageType | None = None
     in_slot: bool = False
+    size: int = 0
     lasting: bool = False
 
 
@@ -151,7 +153,8 @@ class Reader:
     def _receive(self, incoming: _Incoming) -> Generator[Awaitable, object, None]:
         received, timeline, way = incoming
         if (yield from way):
-            self.enqueue(Event(received.message, timeline, received.responder, self._message_type))
+            message, size = received.message, received.size
+            self.enqueue(Event(message, timeline, received.responder, self._message_type, size=size))
         else:
             self._lost += 1
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from reconros_zenoh.board.endpoints import SubscriptionSource
 from reconros_zenoh.board.hmt import Fifo, FifoPlan
@@ -118,12 +118,11 @@ class Gateway:
         return core.Arrived(streamed._replace(timeline=streamed.timeline.fork()))
 
     def _write_hmt(self, event: Event) -> Generator[Awaitable, object, None]:
-        message, timeline = event.message, event.timeline
-        timeline.mark("gateway")
+        event.timeline.mark("gateway")
         read = Signal()
-        Activity(self._read(message, read))
+        Activity(self._read(event.size, read))
         try:
-            yield from self._topic.publish(self, message, timeline)
+            yield from self._topic.publish(self, event.message, event.size, event.timeline)
             self.to_hmt += 1
         except UsageError as error:
             self.refused += 1
@@ -131,6 +130,6 @@ class Gateway:
         if read.callbacks is not None:
             yield read
 
-    def _read(self, message: Any, done: Signal) -> Generator[Awaitable, object, None]:
-        yield from self._board.memif.transfer(self._topic.size(message))
+    def _read(self, size: int, done: Signal) -> Generator[Awaitable, object, None]:
+        yield from self._board.memif.transfer(size)
         done.fire()

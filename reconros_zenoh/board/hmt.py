@@ -168,10 +168,6 @@ class HardwareTopic:
         self._fifos.remove(fifo)
         fifo.close()
 
-    def size(self, message: Any) -> int:
-        """Return how many bytes the message has on a stream: as many as on the wire."""
-        return sum(map(len, self.type.encode(message)))
-
     def open_tap(self) -> None:
         """Publish what passes on the topic's key; without any cost in the model."""
         publisher = self._board.context.transport.publish(self.key, QosProfile())
@@ -183,11 +179,12 @@ class HardwareTopic:
         self._tap = Stream(put, QosProfile().depth)
 
     def publish(
-        self, publisher: Hashable, message: Any, timeline: Timeline
+        self, publisher: Hashable, message: Any, size: int, timeline: Timeline
     ) -> Generator[Awaitable, object, None]:
-        """Return when the message has passed; raise UsageError when it is larger than somebody's FIFO."""
-        parts = self.type.encode(message)
-        size = sum(map(len, parts))
+        """Return when the message of `size` bytes on the wire has passed.
+
+        Raise UsageError when it is larger than somebody's FIFO.
+        """
         for fifo in self._fifos:
             if fifo.plan.message_bytes is not None and size > fifo.plan.message_bytes:
                 raise UsageError(
@@ -205,7 +202,7 @@ class HardwareTopic:
         if streamed.complete.callbacks is not None:
             yield streamed.complete
         if self._tap is not None:
-            self._tap.put(parts)
+            self._tap.put(self.type.encode(message))
 
     def _pass(self, streamed: Streamed) -> Generator[Awaitable, object, None]:
         self.passed += 1
@@ -215,10 +212,11 @@ class HardwareTopic:
         duration_ns = round(streamed.size * self._ns_per_byte)
         if duration_ns:
             yield self._board.environment.timeout(duration_ns)
+        # First whoever has waited for the last word: a gateway has a longer way to go than the others.
+        streamed.complete.fire()
         for fifo in streamed.targets:
             if not fifo.cut_through:
                 self._hand_over(fifo, streamed)
-        streamed.complete.fire()
 
     def _hand_over(self, fifo: Fifo, streamed: Streamed) -> None:
         if self._overhead_ns:
@@ -297,5 +295,6 @@ class HmtWriter:
 
     def publish(self, message: object, osif: Osif, timeline: Timeline) -> Generator[Awaitable, object, None]:  # noqa: ARG002
         """Return when the message has passed the stream, after waiting for room where a FIFO blocks."""
-        yield from self._topic.publish(self, message, timeline.fork())
+        size = sum(map(len, self._topic.type.encode(message)))
+        yield from self._topic.publish(self, message, size, timeline.fork())
         timeline.mark("hmt")

@@ -13,6 +13,10 @@ if TYPE_CHECKING:
     from reconros_zenoh.clock.virtual import VirtualEnvironment
 
 
+_ROUNDING_NS = 1e-9
+"""Shares are rounded: a job whose exact end is a whole nanosecond must not be given the next one."""
+
+
 class _Job(Signal):
     """Work that is being done; fires when it is done.
 
@@ -120,7 +124,7 @@ class SharedResource:
         job.rate = rate
         job.due_ns = None
         if rate > 0:
-            delay_ns = max(0, math.ceil(job.remaining / rate))
+            delay_ns = max(0, math.ceil(job.remaining / rate - _ROUNDING_NS))
             job.due_ns = now_ns + delay_ns
             self._environment.call_later(delay_ns, self._complete, job)
 

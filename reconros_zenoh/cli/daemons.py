@@ -13,6 +13,7 @@ from rich.console import Console
 
 from reconros_zenoh.board.control import ask_status
 from reconros_zenoh.cli.options import ENDPOINT, AsJson, Domain, Router
+from reconros_zenoh.cli.status_screen import print_status
 from reconros_zenoh.experiments.roundtrip import application_folder
 from reconros_zenoh.transport.zenoh import ZenohRouter, ZenohTransport
 
@@ -125,5 +126,7 @@ def status(
         answer = {"router": router} if name == "router" else ask_status(transport, name)
     if as_json:
         print(json.dumps(answer))
+    elif name == "router":
+        print(f"a router listens on {router}")
     else:
-        Console().print(answer)
+        print_status(Console(), answer)

@@ -19,6 +19,8 @@ from reconros_zenoh.errors import UsageError
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
+    from reconros_zenoh.experiments.roundtrip import Clock
+
 _FIGURES = {"hardware": "fig6_hardware_publisher.png", "software": "fig7_software_publisher.png"}
 
 
@@ -33,7 +35,9 @@ def gateway(
     publisher: Annotated[
         PublisherName | None, typer.Option(help="Where the publisher runs.", show_default="both")
     ] = None,
-    clock: Annotated[ClockName, typer.Option(help="Real time, or virtual time.")] = ClockName.VIRTUAL,
+    clock: Annotated[
+        ClockName | None, typer.Option(help="Real time, or virtual time.", show_default="virtual")
+    ] = None,
     sizes: Annotated[str, typer.Option(metavar="LIST", help="Message sizes.")] = "10kB,100kB,1MB,10MB",
     subscribers: Annotated[str, typer.Option(metavar="LIST", help="Subscribers in hardware.")] = "2,4,8",
     repeat: Annotated[int, typer.Option(min=1, help="Messages per cell.")] = 500,
@@ -48,12 +52,21 @@ def gateway(
     """
     from reconros_zenoh.board.profile import read_profile
     from reconros_zenoh.experiments.gateway import PUBLISHERS, measure_gateway
+    from reconros_zenoh.experiments.gateway_native import measure_native
 
     byte_counts, counts = _sizes(sizes), _counts(subscribers)
     board = read_profile(profile)
+    time: Clock = "wall" if clock is ClockName.WALL else "virtual"
     publishers = [name for name in PUBLISHERS if publisher is None or name == publisher.value]
+    if board.model is None:
+        if clock is ClockName.VIRTUAL or publisher is PublisherName.HARDWARE:
+            raise UsageError("profile native runs in real time, with the publisher in software.")
+        publishers = ["software"]
     with run_bar("cells", len(publishers) * len(byte_counts) * len(counts), quiet=as_json) as advance:
-        result = measure_gateway(clock.value, board, publishers, byte_counts, counts, repeat, advance)
+        if board.model is None:
+            result = measure_native(byte_counts, counts, repeat, advance)
+        else:
+            result = measure_gateway(time, board, publishers, byte_counts, counts, repeat, advance)
     paths = _write(out, result)
     if as_json:
         print(json.dumps(result))
@@ -96,6 +109,9 @@ def _print(console: Console, result: dict[str, Any]) -> None:
             f"{anchor['name']}: speedup {anchor['ours']:.2f}, paper {anchor['paper']:g} "
             f"({anchor['error']:+.1%})"
         )
+    lost = sum(cell[variant]["lost"] for cell in result["cells"] for variant in ("smt", "gateway"))
+    if lost:
+        console.print(f"{lost} messages were lost to somebody and are not in the times")
     for line in result.get("copies", ()):
         console.print(line)
 

@@ -15,6 +15,7 @@ from board_daemon.hosting import BoardOptions
 from reconros_zenoh.board.control import status
 from reconros_zenoh.board.profile import profile_names, read_profile
 from reconros_zenoh.cli.options import ENDPOINT, AsJson, ClockName, Domain, Router
+from reconros_zenoh.cli.status_screen import print_status
 from reconros_zenoh.errors import UsageError
 from reconros_zenoh.project.loader import load_project
 from reconros_zenoh.project.target import target_profile
@@ -87,7 +88,7 @@ def run(
     if as_json:
         print(json.dumps(done))
     else:
-        Console().print(done)
+        print_status(Console(), done)
 
 
 def _profile_of(configuration: BuildConfiguration) -> str:

@@ -42,10 +42,18 @@ _PAUSE_NS = 1_000_000
 
 @dataclass(frozen=True, slots=True)
 class Times:
-    """Mean transmission times [ms]: the largest over the subscribers in hardware, and that to software."""
+    """Transmission times [ms]: the largest over the subscribers in hardware, and that to software.
+
+    Messages that were `lost` to somebody are not in them.
+    """
 
     hw_max_ms: float
     sw_ms: float
+    lost: int = 0
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the times under the names of the experiment's JSON."""
+        return {"hw_max_ms": self.hw_max_ms, "sw_ms": self.sw_ms, "lost": self.lost}
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,8 +72,8 @@ class Cell:
             "publisher": self.publisher,
             "size": self.size,
             "subscribers": self.subscribers,
-            "smt": {"hw_max_ms": self.smt.hw_max_ms, "sw_ms": self.smt.sw_ms},
-            "gateway": {"hw_max_ms": self.gateway.hw_max_ms, "sw_ms": self.gateway.sw_ms},
+            "smt": self.smt.as_json(),
+            "gateway": self.gateway.as_json(),
             "speedup_hw": self.speedup_hw,
             "speedup_sw": self.speedup_sw,
         }
@@ -119,12 +127,18 @@ def measure_gateway(
         "clock": clock,
         "repeat": repeat,
         "profile": profile.name,
+        "statistic": "mean",
         "cells": [cell.as_json() for cell in cells],
         "anchors": anchors(cells),
-        "host": {
-            "machine": f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores",
-            "overruns": overruns,
-        },
+        "host": host(overruns),
+    }
+
+
+def host(overruns: int) -> dict[str, Any]:
+    """Return what is known of this host, and how often it was slower than the model."""
+    return {
+        "machine": f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores",
+        "overruns": overruns,
     }
 
 
@@ -257,8 +271,8 @@ class _Rounds:
     def _begin(self) -> None:
         self._number += 1
         self._got.clear()
-        self._ready = True
         self._environment.call_later(_LIMIT_NS, self._give_up, self._number)
+        self._ready = True
         self._on_ready()
 
     def _note(self, name: str, number: int, transmission_ns: int) -> None:

@@ -32,7 +32,7 @@ def run_wall(plan: Plan, report: BoardReport, on_progress: Callable[[str, str], 
     """
     with as_file(files("deploy") / "roundtrip.yaml") as compose:
         for mapping, path in plan.mappings.items():
-            router = f"tcp/127.0.0.1:{_free_port()}"
+            router = f"tcp/127.0.0.1:{free_port()}"
             environment = {
                 **os.environ,
                 "ROUTER": router,
@@ -88,7 +88,7 @@ class _Watch:
             self._seen[client] = max(lines, 0)
 
 
-def _free_port() -> int:
+def free_port() -> int:
     """Return a port of the loopback interface that was free just now."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import gc
+from functools import cache
 
 # <malloc.h> of glibc
 _M_TRIM_THRESHOLD = -1
@@ -14,11 +15,12 @@ _MIB = 1024 * 1024
 _OBJECTS_BETWEEN_COLLECTIONS = 50_000
 
 
+@cache
 def tune_memory() -> None:
     """Leave what was imported out of the search for garbage, and keep large buffers in this process.
 
-    To be called once, when everything is imported and before any thread starts. CPython's collector would go
-    through all modules time and again.
+    To be called when everything is imported; only the first call does something, for what is garbage by a
+    later one would stay for ever. CPython's collector would go through all modules time and again.
     """
     gc.freeze()
     gc.set_threshold(_OBJECTS_BETWEEN_COLLECTIONS)

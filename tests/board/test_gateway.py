@@ -38,6 +38,10 @@ HEADER = 16
 U = 1000
 
 
+def size_of(body: Any) -> int:
+    return sum(map(len, words.encode(body)))
+
+
 def message(number: int = 0, size: int = U) -> Any:
     """A message of `size` bytes on the wire whose first byte is the number."""
     data = np.zeros(size - HEADER, np.uint8)
@@ -75,7 +79,8 @@ class Side:
 
     def publish_in_hardware(self, body: Any) -> None:
         start(
-            self.environment, self.topic.publish("p", body, Timeline(self.environment, self.environment.now))
+            self.environment,
+            self.topic.publish("p", body, size_of(body), Timeline(self.environment, self.environment.now)),
         )
 
     def publish_in_software(self, body: Any) -> None:

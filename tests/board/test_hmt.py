@@ -29,6 +29,10 @@ layout = types().message("std_msgs/msg/MultiArrayLayout").cls(dim=[], data_offse
 HEADER = 4 + 4 + 4 + 4  # encapsulation, dimensions, offset, count
 
 
+def size_of(body: Any) -> int:
+    return sum(map(len, words.encode(body)))
+
+
 def message(size: int) -> Any:
     """A message of `size` bytes on the wire."""
     return words.cls(layout=layout, data=np.zeros(size - HEADER, np.uint8))
@@ -56,7 +60,7 @@ class Stream:
 
     def publish(self, body: Any, publisher: str = "p") -> Any:
         timeline = Timeline(self.environment, self.environment.now)
-        return start(self.environment, self.topic.publish(publisher, body, timeline))
+        return start(self.environment, self.topic.publish(publisher, body, size_of(body), timeline))
 
 
 def test_a_message_takes_its_size_on_the_stream_and_its_overhead_at_each_subscriber() -> None:
@@ -175,7 +179,7 @@ def test_a_kernel_between_two_streams_costs_no_memif() -> None:
     )
     executor.spin()
     body = message(100)
-    start(board.environment, into.publish("p", body, Timeline(board.environment, 0)))
+    start(board.environment, into.publish("p", body, size_of(body), Timeline(board.environment, 0)))
     board.environment.run()
     assert log[0] is body.data
     streamed = arrived.take()
@@ -212,7 +216,7 @@ def test_a_bad_message_is_counted_and_its_place_is_free_again() -> None:
 
     source.open(lambda: None, check)
     for _ in range(3):
-        start(board.environment, topic.publish("p", message(20), Timeline(board.environment, 0)))
+        start(board.environment, topic.publish("p", message(20), 20, Timeline(board.environment, 0)))
     board.environment.run()
     assert not source.is_ready()
     assert topic.passed == 3

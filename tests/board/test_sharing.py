@@ -6,7 +6,7 @@ from fractions import Fraction
 from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from small_board import start
 
@@ -170,6 +170,7 @@ def max_min_fair(limits: Mapping[int, Fraction], capacity: Fraction) -> dict[int
     return rates
 
 
+@example([Job(0, 2, True, None)] * 5, [], (0.4, 0.4))  # a fifth of 0.4 is rounded
 @given(any_jobs, any_holds, machines)
 def test_every_job_gets_its_fair_share_until_its_work_is_done_and_no_longer(
     jobs: list[Job], holds: list[Hold], machine: tuple[float, float]

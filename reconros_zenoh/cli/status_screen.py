@@ -1,0 +1,107 @@
+"""A board's status for the eye."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from rich.box import SIMPLE_HEAD
+from rich.table import Table
+from rich.text import Text
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
+    from rich.console import Console
+
+
+def print_status(console: Console, status: Mapping[str, Any]) -> None:
+    """Print what `board.control.status` returned as tables."""
+    console.print(
+        f"board {status['board']}: profile {status['profile']}, {status['executor']} executor, "
+        f"domain {status['domain']}",
+        highlight=False,
+    )
+    _print(
+        console,
+        ("callback", "kind", "runs in", "time from", "calls", "failed", "dropped"),
+        (
+            (name, each["kind"], _places(each), _timing(each), each["calls"], each["failed"], each["dropped"])
+            for name, each in status["callbacks"].items()
+        ),
+    )
+    _print(
+        console,
+        ("slot", "holds", "reconfigurations", "reconfiguring [ms]", "busy [ms]"),
+        (
+            (
+                slot["id"],
+                slot["holds"] or "-",
+                slot["reconfigurations"],
+                _ms(slot["reconfiguration_ms"]),
+                _ms(slot["busy_ms"]),
+            )
+            for slot in status["slots"]
+        ),
+    )
+    _print_spans(console, status["spans_ms"])
+    _print(
+        console,
+        ("stream", "passed", "dropped", "waits for room"),
+        ((key, hmt["passed"], hmt["dropped"], hmt["waits"]) for key, hmt in status["hmt"].items()),
+    )
+    _print(
+        console,
+        ("gateway", "hardware-mapped", "software-mapped", "to hardware", "to software"),
+        ((g["name"], g["hmt"], g["smt"], g["to_hmt"], g["to_smt"]) for g in status["gateways"]),
+    )
+    dropped = {topic: each["dropped"] for topic, each in status["publishers"].items() if each["dropped"]}
+    for what, counts in (("dropped before they were sent", dropped), ("refused", status["rejected"])):
+        if counts:
+            listed = ", ".join(f"{name} {count}" for name, count in counts.items())
+            console.print(Text(f"messages {what}: {listed}", style="yellow"))
+    _print_host(console, status["host"])
+
+
+def _print_spans(console: Console, spans_ms: Mapping[str, Mapping[str, float]]) -> None:
+    stages = list(dict.fromkeys(stage for each in spans_ms.values() for stage in each))
+    _print(
+        console,
+        ("mean [ms] of", *stages),
+        ((name, *(_ms(each.get(stage, 0.0)) for stage in stages)) for name, each in spans_ms.items()),
+    )
+
+
+def _print_host(console: Console, host: Mapping[str, Any]) -> None:
+    lag = "" if host["lag_p50_us"] is None else f"event loop late by {host['lag_p50_us']:.0f} us (median), "
+    console.print(
+        Text(
+            f"host: {lag}{host['overruns']} results later than modelled "
+            f"({_ms(host['overrun_ms'])} ms in all)",
+            style="yellow" if host["overruns"] else "",
+        )
+    )
+
+
+def _places(callback: Mapping[str, Any]) -> str:
+    slots = [f"slot {slot}" for slot in callback["slots"]]
+    return ", ".join((["software"] if callback["software"] else []) + slots)
+
+
+def _timing(callback: Mapping[str, Any]) -> str:
+    return ", ".join(dict.fromkeys(str(timing["basis"]) for timing in callback["timing"].values()))
+
+
+def _ms(value: float) -> str:
+    return f"{value:.3g}" if value < 1000 else f"{value:.0f}"
+
+
+def _print(console: Console, columns: Iterable[str], rows: Iterable[Iterable[object]]) -> None:
+    """Print a table, or nothing when it has no rows."""
+    table = Table(box=SIMPLE_HEAD, show_edge=False, padding=(0, 1, 0, 0))
+    for column in columns:
+        table.add_column(Text(column), overflow="fold")
+    for row in rows:
+        table.add_row(*map(str, row))
+    if table.rows:
+        console.print(table, highlight=False)
+        console.print()

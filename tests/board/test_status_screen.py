@@ -1,0 +1,60 @@
+"""The status as people read it."""
+
+from __future__ import annotations
+
+import io
+
+from rich.console import Console
+
+from reconros_zenoh.cli.status_screen import print_status
+
+STATUS = {
+    "board": "b",
+    "profile": "native",
+    "executor": "reconros",
+    "domain": 0,
+    "callbacks": {
+        "sobel": {
+            "kind": "SUB",
+            "software": True,
+            "slots": [2, 3],
+            "timing": {"software": {"basis": "table"}, "hardware": {"basis": "cycles"}},
+            "calls": 7,
+            "failed": 1,
+            "dropped": 2,
+        }
+    },
+    "slots": [{"id": 2, "holds": None, "reconfigurations": 0, "reconfiguration_ms": 0.0, "busy_ms": 12.25}],
+    "publishers": {"/out": {"dropped": 0}, "/full": {"dropped": 4}},
+    "gateways": [],
+    "hmt": {},
+    "spans_ms": {"sobel": {"dds": 1.5, "memif": 0.25}},
+    "rejected": {"truncated": 3},
+    "host": {"overruns": 5, "overrun_ms": 1234.5, "lag_p50_us": 31.4, "lag_p99_us": 99.0},
+}
+
+
+def printed(status: dict[str, object]) -> list[str]:
+    stream = io.StringIO()
+    print_status(Console(file=stream, width=200), status)
+    return [" ".join(line.split()) for line in stream.getvalue().splitlines()]
+
+
+def test_everything_that_the_board_told_is_shown() -> None:
+    lines = printed(STATUS)
+    assert "board b: profile native, reconros executor, domain 0" in lines
+    assert "sobel SUB software, slot 2, slot 3 table, cycles 7 1 2" in lines
+    assert "slot holds reconfigurations reconfiguring [ms] busy [ms]" in lines
+    assert "2 - 0 0 12.2" in lines
+    assert "sobel 1.5 0.25" in lines
+    assert "messages dropped before they were sent: /full 4" in lines
+    assert "messages refused: truncated 3" in lines
+    assert lines[-1] == (
+        "host: event loop late by 31 us (median), 5 results later than modelled (1234 ms in all)"
+    )
+
+
+def test_what_there_is_nothing_of_is_left_out() -> None:
+    text = "\n".join(printed(STATUS | {"rejected": {}, "publishers": {}, "spans_ms": {}}))
+    for heading in ("gateway", "stream", "refused", "dropped before", "mean"):
+        assert heading not in text

@@ -1,0 +1,83 @@
+"""The gateway experiment with real bytes between real processes: that it runs, checks and cleans up."""
+
+from __future__ import annotations
+
+import json
+import multiprocessing
+import subprocess
+import sys
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+from reconros_zenoh.errors import ExperimentError
+from reconros_zenoh.experiments.gateway_native import Receiver, take_turns
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+
+def test_one_cell_between_processes(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "reconros_zenoh", "experiment", "gateway", "--profile", "native"]
+    options = ["--sizes", "300kB", "--subscribers", "2", "--repeat", "2", "--json", "--out", str(tmp_path)]
+    done = subprocess.run([*command, *options], capture_output=True, text=True, check=False, timeout=100)
+    assert done.returncode == 0, done.stderr
+    result = json.loads(done.stdout)
+    (cell,) = result["cells"]
+    assert (cell["publisher"], cell["size"], cell["subscribers"]) == ("software", 300_000, 2)
+    for variant in ("smt", "gateway"):
+        assert cell[variant]["hw_max_ms"] > 0
+        assert cell[variant]["sw_ms"] > 0
+    assert result["statistic"] == "median"
+    assert any("read-only view" in line for line in result["copies"])
+
+
+@pytest.mark.parametrize("options", [["--clock", "virtual"], ["--publisher", "hardware"]])
+def test_the_native_profile_is_real_time_and_software(options: list[str], tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "reconros_zenoh", "experiment", "gateway", "--profile", "native"]
+    done = subprocess.run(
+        [*command, *options, "--out", str(tmp_path)], capture_output=True, text=True, check=False, timeout=60
+    )
+    assert done.returncode == 2
+    assert done.stderr == ("reconros: profile native runs in real time, with the publisher in software.\n")
+
+
+def test_a_receiver_reports_when_all_its_readers_have_a_message_and_checks_the_bodies() -> None:
+    here, there = multiprocessing.Pipe()
+    receiver = Receiver(there, 2)
+    body = np.frombuffer(b"123456789", np.uint8)
+
+    def image(number: int, crc: str) -> Any:
+        class Stamp:
+            sec = nanosec = 0
+
+        class Header:
+            stamp = Stamp
+            frame_id = f"{number} {crc}"
+
+        class Image:
+            header = Header
+            data = body
+
+        return Image
+
+    receiver.note("a", image(1, "cbf43926"))  # lost to b
+    receiver.note("a", image(2, "cbf43926"))
+    assert not here.poll()
+    receiver.note("b", image(2, "cbf43926"))
+    assert [(name, number) for name, number, _ in here.recv()] == [("a", 2), ("b", 2)]
+    receiver.check()
+    assert here.recv() == ""
+    receiver.note("a", image(3, "00000000"))
+    receiver.check()
+    assert here.recv() == "1 of 1 messages came with other bytes."
+
+
+def test_too_many_lost_messages_end_the_experiment() -> None:
+    class Losing:
+        def measure(self) -> None:
+            return None
+
+    with pytest.raises(ExperimentError, match="x: 3 of 3 messages were lost"):
+        take_turns(lambda _: {"x": Losing()}, 3)  # type: ignore[dict-item] # all of a setup that it needs
