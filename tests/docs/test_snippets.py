@@ -1,0 +1,143 @@
+"""Every snippet of docs/ runs and prints what the page says; every command of README.md is there.
+
+A block of docs/ is marked behind its opening fence. ```python runs, all of a page in one namespace. With the
+name of a file behind the language (```ini robot/build.cfg) a block is written there first. ```console holds
+commands of `reconros` behind `$ `, and below each one lines of what it prints; `...` stands for any lines. A
+console block marked `by hand` needs a running board, a second terminal or minutes: its verbs and options are
+checked. Everything happens in a folder of its own.
+"""
+
+from __future__ import annotations
+
+import re
+import shlex
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+import pytest
+from typer.testing import CliRunner
+
+from reconros_zenoh.cli.main import _VERBS, _application
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+ROOT = Path(__file__).parents[2]
+PAGES = sorted((ROOT / "docs").glob("*.md"))
+BLOCK = re.compile(r"^```(?P<language>\w*)(?P<rest>[^\n]*)\n(?P<text>.*?)^```$", re.DOTALL | re.MULTILINE)
+APPLICATION = _application(list(_VERBS))
+
+
+class Block(NamedTuple):
+    """A fenced block: what stands behind the fence, and in which line of the page its text begins."""
+
+    language: str
+    rest: str
+    text: str
+    line: int
+
+
+def blocks(path: Path) -> Iterator[Block]:
+    text = path.read_text(encoding="utf-8")
+    for match in BLOCK.finditer(text):
+        line = text.count("\n", 0, match.start("text")) + 1
+        yield Block(match["language"], match["rest"].strip(), match["text"], line)
+
+
+def invoke(command: str, *more: str) -> list[str]:
+    """Return the lines that the command prints; raise what it raises."""
+    program, *arguments = shlex.split(command, comments=True)
+    assert program == "reconros", command
+    result = CliRunner().invoke(APPLICATION, [*arguments, *more])
+    if result.exception and not isinstance(result.exception, SystemExit):
+        raise result.exception
+    assert result.exit_code == 0, f"{command}: {result.output}"
+    return [line.rstrip() for line in result.stdout.splitlines()]
+
+
+def transcript(text: str) -> Iterator[tuple[str, list[str]]]:
+    """Go through the commands of a console block, each with the lines that the page shows below it."""
+    for part in re.split(r"^\$ ", text, flags=re.MULTILINE)[1:]:
+        command, *shown = part.splitlines()
+        yield command, [line.rstrip() for line in shown if line.strip()]
+
+
+def check_output(printed: list[str], shown: list[str], place: str) -> None:
+    """Find what is shown among what was printed: line after line, any lines in between where `...` stands."""
+    rest = [line for line in printed if line]
+    anywhere = False
+    for line in shown:
+        if line.strip() == "...":
+            anywhere = True
+            continue
+        assert line in rest, f"{place}: {line!r} is not printed there: {rest}"
+        at = rest.index(line)
+        assert anywhere or at == 0, f"{place}: before {line!r} stands {rest[:at]}"
+        rest, anywhere = rest[at + 1 :], False
+
+
+def test_every_page_is_found_from_the_readme() -> None:
+    assert PAGES
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert [page.name for page in PAGES if f"docs/{page.name}" not in readme] == []
+
+
+@pytest.mark.parametrize("page", PAGES, ids=[page.stem for page in PAGES])
+def test_the_snippets_of_a_page(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "100")
+    names: dict[str, object] = {"__name__": page.stem}
+    ran = 0
+    for block in blocks(page):
+        place = f"{page.name}:{block.line}"
+        if block.language == "console":
+            assert block.rest in {"", "by hand"}, place
+            for command, shown in transcript(block.text):
+                if block.rest:
+                    invoke(command, "--help")
+                else:
+                    check_output(invoke(command), shown, place)
+                ran += 1
+        elif block.rest:
+            path = tmp_path / block.rest
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(block.text, encoding="utf-8")
+        elif block.language == "python":
+            # Behind empty lines, so that an error names the line of the page.
+            exec(compile("\n" * (block.line - 1) + block.text, str(page), "exec"), names)
+            ran += 1
+    assert ran
+
+
+@pytest.mark.parametrize("page", [ROOT / "README.md", *PAGES], ids=lambda page: page.stem)
+def test_links_lead_somewhere(page: Path) -> None:
+    targets = re.findall(r"\]\((?!https?:)([^)#]+)", page.read_text(encoding="utf-8"))
+    assert [target for target in targets if not (page.parent / target).exists()] == []
+
+
+def readme_commands() -> list[str]:
+    """Return the command lines of README.md."""
+    lines = [line for block in blocks(ROOT / "README.md") for line in block.text.splitlines()]
+    return [line for line in lines if line.startswith("reconros ")]
+
+
+def test_the_readme_has_commands() -> None:
+    assert len(readme_commands()) > 20
+
+
+@pytest.mark.parametrize("command", readme_commands())
+def test_a_command_of_the_readme_is_there(command: str) -> None:
+    invoke(command, "--help")
+
+
+def test_a_command_that_is_not_there_is_noticed() -> None:
+    with pytest.raises(AssertionError, match="No such option"):
+        invoke("reconros run blink --mappings software", "--help")
+
+
+def test_output_that_differs_is_noticed() -> None:
+    check_output(["a", "", "b", "c"], ["a", "...", "c"], "here")
+    with pytest.raises(AssertionError, match="is not printed"):
+        check_output(["a"], ["b"], "here")
+    with pytest.raises(AssertionError, match="before 'b' stands"):
+        check_output(["a", "b"], ["b"], "here")
