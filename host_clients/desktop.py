@@ -46,10 +46,11 @@ class ViewerOptions:
     members: int = 1
 
 
-def run_camera(options: CameraOptions) -> int:
+def run_camera(options: CameraOptions, on_ready: Callable[[], None]) -> int:
     """Publish the pictures and return how many were: fewer than asked for after SIGINT or SIGTERM.
 
-    Raise TransportError when there is no router, or nobody subscribes within `wait_s`.
+    `on_ready` is called when a signal would end it. Raise TransportError when there is no router, or nobody
+    subscribes within `wait_s`.
     """
     environment, stop = _begin()
     with ZenohTransport.open(options.router) as transport:
@@ -59,6 +60,7 @@ def run_camera(options: CameraOptions) -> int:
             start.succeed()
         else:
             gather(transport, environment, start, options.group, "camera", options.members)
+        on_ready()
         environment.run(until=camera.done | stop)
         camera.close()
         return camera.sent

@@ -34,7 +34,8 @@ def camera(
     from host_clients.camera import CameraOptions
     from host_clients.desktop import run_camera
 
-    sent = run_camera(CameraOptions(router, pictures, rate, wait, domain, group, members))
+    options = CameraOptions(router, pictures, rate, wait, domain, group, members)
+    sent = run_camera(options, lambda: print("camera: ready", flush=True))
     print(f"camera: {sent} pictures published", flush=True)
     raise typer.Exit(0 if sent == pictures else 130)
 
