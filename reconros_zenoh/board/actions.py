@@ -85,7 +85,7 @@ class ActionSource:
 
     def _on_goal(self, handle: GoalHandle, received: Received) -> None:
         timeline = cast("Arrived", received).timeline
-        self._waiting.append(Event(handle, timeline, _Failure(self._server, handle)))
+        self._waiting.append(Event(handle, timeline, _Failure(self._server, handle), lasting=True))
         self._on_ready()
 
 
@@ -130,11 +130,11 @@ class ActionClientSource:
         return self._client.new_goal_id()
 
     def send_goal(self, goal: object, goal_id: bytes) -> None:
-        """Send a goal; callable from any thread. Raises UsageError when it is not of the action's type."""
+        """Send a goal; called by the event loop. Raises UsageError when it is not of the action's type."""
         self._client.send_goal(goal, goal_id)
 
     def cancel_goal(self, goal_id: bytes) -> None:
-        """Ask for a goal to end early; callable from any thread."""
+        """Ask for a goal to end early; called by the event loop."""
         self._client.cancel(goal_id)
 
     def is_ready(self) -> bool:

@@ -31,11 +31,21 @@ def alive_key(board: str) -> str:
 
 
 def claim_name(transport: Transport, board: str) -> None:
-    """Raise UsageError when a board of this name is there already."""
-    if transport.tokens(alive_key(board), _ANSWER_NS):
+    """Take the name until the transport is closed; raise UsageError when another board has it.
+
+    Of several that ask at the same time one gets it. Each claims the name first and then looks: who sees an
+    owner, or a claim of a lower session id, gives way; the others have not looked yet when this one becomes
+    the owner, or see its claim.
+    """
+    claims, owners = f"reconros/{board}/claims/", f"reconros/{board}/owner/"
+    mine = claims + transport.session_id
+    transport.declare_token(mine)
+    tokens = transport.tokens(f"reconros/{board}/*/*", _ANSWER_NS)
+    if any(token.startswith(owners) or (token.startswith(claims) and token < mine) for token in tokens):
         raise UsageError(
             f"a board named {board!r} is running already. Stop it, or start this one with --name."
         )
+    transport.declare_token(owners + transport.session_id)
 
 
 class ControlServer:

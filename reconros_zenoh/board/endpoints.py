@@ -33,7 +33,8 @@ class Event:
 
     `message_type` is None for what has no place in memory as a C struct. `in_slot`: it came over a
     hardware-mapped topic, so a slot need not read it from main memory. `size` is that of a subscription's
-    message in bytes on the wire.
+    message in bytes on the wire. `lasting`: how long its callback takes depends on other events, as that of a
+    goal on being canceled.
     """
 
     message: Any
@@ -42,6 +43,7 @@ class Event:
     message_type: MessageType | None = None
     in_slot: bool = False
     size: int = 0
+    lasting: bool = False
 
 
 class Source(Protocol):

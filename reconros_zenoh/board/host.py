@@ -92,11 +92,15 @@ class Host:
     ) -> Future[R] | _Done[R]:
         """Start a computation and return its future; `task` names what tends to take equally long.
 
+        A task of None may take any time, because it waits for others: it never holds up the event loop.
+
         With a limit it has a thread of its own, which nobody waits for longer: in virtual time the limit is
         one of this host's time as well, and its error stands in for the result.
         """
         if limit is not None:
             return self._start_limited(limit, function, *arguments)
+        if self._pool is not None and task is None:
+            return self._pool.submit(function, *arguments)
         if self._pool is not None and self._expected_ns.get(task, self._in_line_ns) >= self._in_line_ns:
             return self._pool.submit(self._timed, task, function, *arguments)
         try:

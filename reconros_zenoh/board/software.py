@@ -51,12 +51,17 @@ class SoftwareContext:
 
     def __init__(self, board: Board, callback: str, time: ExecutionTime) -> None:
         self._board = board
+        self._callback = callback
         self.started_ns = board.environment.now
         # What is measured is really computed each time.
         self._really = time.ns is None and time.modelled
         self._mutexes: dict[Mutex, None] = {}
         self.sends: list[Callable[[Timeline], object]] = []
-        self.log = logging.getLogger(f"{__name__}.{callback}")
+
+    @property
+    def log(self) -> logging.Logger:
+        """The callback's logger; what it says stands in the board's log."""
+        return logging.getLogger(f"{__name__}.{self._callback}")
 
     @property
     def now_ns(self) -> int:

@@ -77,9 +77,11 @@ class StackNode:
         arrivals = Arrivals(self._board, answerable, QosProfile().depth, self._label)
         self._node.service(service_type, name, arrivals.accept)
 
-    def client(self, service_type: ServiceType, name: str) -> StackClient:
-        """Return a new service client."""
-        return StackClient(self._board, self._node.client(service_type, name), self._label)
+    def client(
+        self, service_type: ServiceType, name: str, on_matching: Callable[[bool], None] | None = None
+    ) -> StackClient:
+        """Return a new service client; `on_matching` as in `Transport.request`."""
+        return StackClient(self._board, self._node.client(service_type, name, on_matching), self._label)
 
 
 class Arrivals:

@@ -110,20 +110,19 @@ class SoftwareWorker(Worker):
     ) -> Generator[Awaitable, object, object]:
         board, timeline, time = self._board, event.timeline, implementation.time
         function, limit, host = implementation.function, implementation.limit, self._board.host
+        task = None if event.lasting else function
         if time.ns is not None:
-            future = host.start(function, function, event.message, context, limit=limit)
+            future = host.start(task, function, event.message, context, limit=limit)
             yield from board.cpu.run(time.ns)
             timeline.mark("execution")
             response = yield from host.late_result(future)
             timeline.mark("overrun")
         elif not time.modelled:
-            response = yield from host.result(
-                host.start(function, function, event.message, context, limit=limit)
-            )
+            response = yield from host.result(host.start(task, function, event.message, context, limit=limit))
             timeline.mark("execution")
         else:
             started_ns = self._environment.now
-            future_and_time = host.start(function, measured, function, event.message, context, limit=limit)
+            future_and_time = host.start(task, measured, function, event.message, context, limit=limit)
             response, took_ns = yield from host.result(future_and_time)
             left_ns = round(took_ns * time.factor) - (self._environment.now - started_ns)
             yield from board.cpu.run(max(0, left_ns))

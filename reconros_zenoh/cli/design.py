@@ -35,7 +35,8 @@ def design(
         ClockName, typer.Option(help="Real time with processes, or virtual time.")
     ] = ClockName.WALL,
     seconds: Annotated[
-        float, typer.Option(min=1, metavar="SECONDS", help="How long the camera runs, per variant.")
+        float,
+        typer.Option(min=1, max=86400, metavar="SECONDS", help="How long the camera runs, per variant."),
     ] = 20.0,
     seed: Seed = 0,
     out: Out = Path("results/design"),

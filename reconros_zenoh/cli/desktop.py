@@ -25,7 +25,7 @@ def camera(
     router: Router = ENDPOINT,
     domain: Domain = 0,
     wait: Annotated[
-        float, typer.Option(min=0.1, metavar="SECONDS", help="How long to wait for a subscriber.")
+        float, typer.Option(min=0.1, max=86400, metavar="SECONDS", help="How long to wait for a subscriber.")
     ] = 30.0,
     group: Group = None,
     members: Members = 1,

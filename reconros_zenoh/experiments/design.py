@@ -96,7 +96,7 @@ def finish(plan: DesignPlan, statuses: Mapping[str, Mapping[str, Any]]) -> dict[
         },
         "date": datetime.now(UTC).isoformat(timespec="seconds"),
         "command": shlex.join(["reconros", *sys.argv[1:]]),
-        "host": f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores",
+        "machine": f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores",
         "versions": {
             "Python": platform.python_version(),
             **{name: version(name) for name in ("reconros-zenoh", "eclipse-zenoh", "simpy", "numpy")},
@@ -141,7 +141,7 @@ def _variant(plan: DesignPlan, variant: str, status: Mapping[str, Any]) -> dict[
         },
         "spans_ms": status["spans_ms"],
         "callbacks": status["callbacks"],
-        "overruns": status["host"]["overruns"],
+        "host": status["host"],
     }
 
 

@@ -6,6 +6,7 @@ import base64
 from html import escape
 from typing import TYPE_CHECKING, Any
 
+from reconros_zenoh.measure.findings import host_troubles
 from reconros_zenoh.measure.markup import figure, table, write_page
 from reconros_zenoh.measure.plots import inline_svg, spans_figure
 from reconros_zenoh.measure.statistics import format_ms
@@ -38,11 +39,10 @@ def write_design_report(
     """
     variants = experiment["variants"]
     parts = [_introduction(experiment), "<h2>In short</h2>", _summary(experiment)]
-    if experiment["clock"] == "wall" and (overruns := sum(v["overruns"] for v in variants.values())):
-        parts.append(
-            f'<p class="warning">{overruns} times the computer that ran this needed longer for a computation '
-            "than the board is modelled to need: these figures are partly the host's.</p>"
-        )
+    for name, variant in variants.items():
+        if troubles := host_troubles(variant["host"]):
+            text = f"{_NAMES[name]}: {' '.join(troubles)}"
+            parts.append(f'<p class="warning">{escape(text)}</p>')
     parts += ["<h2>Both variants</h2>", _table(variants), "<h2>The slots</h2>", _slots(variants)]
     spans = {_NAMES[name]: variant["spans_ms"] for name, variant in variants.items()}
     if any(spans.values()):
@@ -58,7 +58,7 @@ def write_design_report(
     parts.append("<h2>What went in, what came out</h2>")
     for name, shown in pictures.items():
         parts += [f"<h3>{_NAMES[name]}</h3>", "".join(map(_picture, shown))]
-    shown_keys = ("command", "profile", "clock", "seconds", "seed", "date", "host")
+    shown_keys = ("command", "profile", "clock", "seconds", "seed", "date", "machine")
     parts += [
         "<h2>How it was made</h2>",
         table(["what", "value"], [[key, str(experiment[key])] for key in shown_keys]),

@@ -14,6 +14,10 @@ ALIKE = 0.06
 """Medians this close are called alike: the real board's own differ by up to 6 % from one day to another."""
 
 
+LATE_US = 500.0
+"""Round trips of the wall and the virtual clock are expected to agree to half a millisecond."""
+
+
 class Finding(NamedTuple):
     """One sentence about a subject; `warning` if it puts the figures in doubt."""
 
@@ -95,15 +99,27 @@ def _host(experiment: Mapping[str, Any]) -> Finding:
         return Finding(
             "host", "time is virtual: the speed of the computer that ran this has no part in the figures."
         )
-    overruns = experiment["host"]["overruns"]
-    if not overruns:
+    troubles = host_troubles(experiment["host"])
+    if not troubles:
         return Finding("host", "it kept up with the modelled times: no overrun.")
-    return Finding(
-        "host",
-        f"{overruns} times a computation took longer on this computer than the board is modelled to need. "
-        "The figures of this run are partly those of the host rather than of the board.",
-        warning=True,
-    )
+    sentence = f"{' '.join(troubles)} The figures of this run are partly those of the host rather than of the"
+    return Finding("host", f"{sentence} board.", warning=True)
+
+
+def host_troubles(host: Mapping[str, Any]) -> list[str]:
+    """Return in what the host was too slow for the model, a sentence each."""
+    troubles = []
+    if overruns := host["overruns"]:
+        troubles.append(
+            f"{overruns} times a computation took longer on this computer than the board is modelled to need."
+        )
+    late_us = host["lag_p99_us"]
+    if late_us is not None and late_us > LATE_US:
+        troubles.append(
+            f"The board's event loop was up to {late_us / 1e3:.1f} ms late (99th percentile): the shortest "
+            "round trips are longer by about that."
+        )
+    return troubles
 
 
 def _listed(items: Iterable[str]) -> str:

@@ -6,7 +6,7 @@ from html import escape
 from typing import TYPE_CHECKING, Any
 
 from reconros_zenoh.measure.compare import MODULO_NOTE, grade
-from reconros_zenoh.measure.findings import findings
+from reconros_zenoh.measure.findings import findings, host_troubles
 from reconros_zenoh.measure.markup import figure, table, write_page
 from reconros_zenoh.measure.plots import grid_figure, inline_svg, spans_figure
 from reconros_zenoh.measure.reference.zynq7100 import (
@@ -97,12 +97,10 @@ def _section(experiment: Mapping[str, Any], records: Mapping[str, Mapping[str, R
         return [*parts, "<p>Nothing was measured.</p>"]
     if clock := _CLOCKS.get(experiment["clock"]):
         parts.append(f"<p>{clock}</p>")
-    if experiment["clock"] == "wall" and (overruns := experiment["host"]["overruns"]):
+    if experiment["clock"] == "wall" and (troubles := host_troubles(experiment["host"])):
         parts.append(
-            f"<p class=\"warning\"><b>These figures are the host's rather than the board's.</b> "
-            f"{overruns} times the computer that ran this needed longer for a computation than the board is "
-            "modelled to need, so the answer came late. Trust the virtual clock, or run again on a faster or "
-            "less busy computer.</p>"
+            "<p class=\"warning\"><b>These figures are the host's rather than the board's.</b> "
+            f"{' '.join(troubles)} Trust the virtual clock, or run again on a less busy computer.</p>"
         )
     parts += [
         "<h3>How often each round-trip time occurred</h3>",

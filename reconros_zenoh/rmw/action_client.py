@@ -14,9 +14,9 @@ from reconros_zenoh.ros.zero_message import zero_message
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from reconros_zenoh.rmw.ends import NodeEnds
+    from reconros_zenoh.rmw.ends import ClientEnd, NodeEnds
     from reconros_zenoh.rmw.received import Received
-    from reconros_zenoh.ros.types import ActionType
+    from reconros_zenoh.ros.types import ActionType, ServiceType
 
 _ANSWER_NS = 10_000_000_000
 _RESULT_NS = 3600 * 1_000_000_000
@@ -51,10 +51,16 @@ class ActionClient:
         self._on_event = on_event
         self._mine: set[bytes] = set()
         hidden = f"{name}/_action"
-        self._send_goal = node.client(action_type.send_goal, f"{hidden}/send_goal")
-        self._cancel_goal = node.client(action_type.cancel_goal, f"{hidden}/cancel_goal")
-        self._get_result = node.client(action_type.get_result, f"{hidden}/get_result")
+        self._matched: dict[ServiceType, bool] = {}
+        self._send_goal = self._client(node, action_type.send_goal, f"{hidden}/send_goal")
+        self._cancel_goal = self._client(node, action_type.cancel_goal, f"{hidden}/cancel_goal")
+        self._get_result = self._client(node, action_type.get_result, f"{hidden}/get_result")
         node.subscription(action_type.feedback_message, f"{hidden}/feedback", self._on_feedback, QosProfile())
+
+    @property
+    def is_ready(self) -> bool:
+        """Whether a server with all of its services is there; goals that are sent before are not answered."""
+        return all(self._matched.values())
 
     def new_goal_id(self) -> bytes:
         """Return the id of a new goal: 16 bytes that no other client has.
@@ -69,6 +75,9 @@ class ActionClient:
         request = zero_message(self._type.send_goal.request)
         request.goal_id.uuid[:] = list(goal_id)
         request.goal = goal
+        if not self.is_ready:
+            self._on_event(ActionEvent("unanswered", goal_id))
+            return
         self._mine.add(goal_id)
 
         def on_response(response: Any) -> None:
@@ -95,6 +104,14 @@ class ActionClient:
                 self._on_event(ActionEvent("canceling" if canceling else "not canceling", goal_id))
 
         self._cancel_goal.call(request, on_response, _ANSWER_NS)
+
+    def _client(self, node: NodeEnds, service_type: ServiceType, name: str) -> ClientEnd:
+        self._matched[service_type] = False
+
+        def on_matching(matching: bool) -> None:
+            self._matched[service_type] = matching
+
+        return node.client(service_type, name, on_matching)
 
     def _ask_result(self, goal_id: bytes) -> None:
         request = zero_message(self._type.get_result.request)

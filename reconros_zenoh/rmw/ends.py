@@ -50,5 +50,7 @@ class NodeEnds(Protocol):
     def service(self, service_type: ServiceType, name: str, sink: Callable[[Any], None]) -> object:
         """Have the requests of a service handed to `sink`."""
 
-    def client(self, service_type: ServiceType, name: str) -> ClientEnd:
-        """Return a new service client."""
+    def client(
+        self, service_type: ServiceType, name: str, on_matching: Callable[[bool], None] | None = None
+    ) -> ClientEnd:
+        """Return a new service client; `on_matching` as in `Transport.request`."""

@@ -52,6 +52,7 @@ class Serving:
         self.client = ActionClient(
             desktop(self.board).node("client"), FIBONACCI, "fibonacci", self.events.append
         )
+        self.run(1)
 
     def send(self, order: int) -> bytes:
         goal_id = self.client.new_goal_id()
@@ -161,6 +162,7 @@ class Asking:
         self.server = ActionServer(
             desktop(self.board).node("server"), FIBONACCI, "fibonacci", self.serve, self.accept
         )
+        self.board.environment.run(until=1)
 
     def ask(self, order: int, context: SoftwareContext) -> None:
         if order < 0:

@@ -12,11 +12,12 @@ from reconros_zenoh.board import control
 from reconros_zenoh.board.control import ControlServer, alive_key, ask_status, claim_name, status
 from reconros_zenoh.board.endpoints import SubscriptionSource
 from reconros_zenoh.board.executor import Executor
+from reconros_zenoh.clock.virtual import VirtualEnvironment
 from reconros_zenoh.clock.wall import WallEnvironment
 from reconros_zenoh.errors import BadMessageError, TransportError, UsageError
 from reconros_zenoh.executor.callbacks import CallbackKind
 from reconros_zenoh.transport.base import Reply
-from reconros_zenoh.transport.simulated import SimulatedNetwork
+from reconros_zenoh.transport.simulated import SimulatedNetwork, SimulatedTransport
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -141,19 +142,43 @@ def test_over_the_wire_the_status_is_msgpack() -> None:
     assert replies == [None], "a closed server does not answer"
 
 
-def test_a_name_can_be_claimed_until_a_board_has_it_and_again_when_it_has_gone() -> None:
-    board, executor = board_that_ran()
-    other = desktop(board).transport
-    claim_name(other, "board0")
-    server = ControlServer(board, executor)
+def claims(transport: SimulatedTransport, name: str) -> bool:
+    try:
+        claim_name(transport, name)
+    except UsageError:
+        return False
+    return True
+
+
+def test_a_name_is_taken_until_its_board_has_gone() -> None:
+    network = SimulatedNetwork(VirtualEnvironment())
+    first, second, third = map(network.transport, "bac")
+    assert claims(first, "board0")
     with pytest.raises(
         UsageError, match=r"'board0' is running already\. Stop it, or start this one with --name"
     ):
-        claim_name(other, "board0")
-    claim_name(other, "board1")
-    claim_name(other, "board")
-    server.close()
-    claim_name(other, "board0")
+        claim_name(second, "board0")
+    assert claims(third, "board1")
+    assert claims(network.transport("d"), "board")
+    first.close()
+    second.close()
+    assert claims(network.transport("e"), "board0")
+
+
+@pytest.mark.parametrize("sessions", ["ab", "ba"])
+def test_of_two_that_claim_a_name_at_once_one_gets_it(sessions: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    network = SimulatedNetwork(VirtualEnvironment())
+    first, second = map(network.transport, sessions)
+    look = first.tokens
+    got = []
+
+    def look_late(key: str, timeout_ns: int) -> list[str]:
+        got.append(claims(second, "board0"))
+        return look(key, timeout_ns)
+
+    monkeypatch.setattr(first, "tokens", look_late)
+    got.append(claims(first, "board0"))
+    assert sorted(got) == [False, True]
 
 
 def test_the_token_of_a_board() -> None:

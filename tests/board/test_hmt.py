@@ -276,7 +276,7 @@ def test_pointers_and_plain_kernels_work_on_a_stream_as_well() -> None:
         executor.add_hw_callback(name, [slot], CallbackKind.SUB, source, callback)
     executor.spin()
     body = words.cls(layout=layout, data=np.arange(84, dtype=np.uint8))
-    start(board.environment, into.publish("p", body, Timeline(board.environment, 0)))
+    start(board.environment, into.publish("p", body, size_of(body), Timeline(board.environment, 0)))
     board.environment.run()
     assert walked[0].tolist() == body.data.tolist()
     assert arrived.take().message.data.tolist() == (2 * body.data).tolist()

@@ -145,6 +145,12 @@ def test_what_cannot_be_run_is_refused(tmp_path: Path, arguments: list[str], mes
         run(tmp_path, *arguments)
 
 
+def test_an_endless_run_is_refused(tmp_path: Path) -> None:
+    result = CliRunner().invoke(application, ["--seconds", "inf", "--out", str(tmp_path)])
+    assert result.exit_code == 2
+    assert "--seconds" in result.output
+
+
 class Example:
     """Vision and control on a network, with what is published on the control topics."""
 

@@ -70,7 +70,7 @@ def test_the_report_tells_everything_and_needs_nothing(tmp_path, write_run, boar
         "sort: shortest under",
         "roundtrip, virtual clock",
         "roundtrip, wall clock",
-        "12 times the computer",
+        "12 times a computation took longer",
         "Where the time goes",
         "swapped columns",
         "modulo 1 s",

@@ -45,6 +45,9 @@ class Case:
             lambda received: self.statuses.append([entry.status for entry in received.message.status_list]),
             STATUS_QOS,
         )
+        assert not self.client.is_ready
+        self.sessions.settle()
+        assert self.client.is_ready
 
     def send(self, order: int = 3) -> bytes:
         goal_id = self.client.new_goal_id()
