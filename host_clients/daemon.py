@@ -75,7 +75,7 @@ def run_client(options: ClientOptions, on_round_trip: Callable[[RoundTrip], None
                 f"`reconros board`, with the same --router and --domain."
             )
         if options.group is not None:
-            _gather(transport, environment, start, options)
+            gather(transport, environment, start, options.group, options.name, options.members)
         else:
             start.succeed()
         environment.run(until=loop.done | stop)
@@ -83,19 +83,24 @@ def run_client(options: ClientOptions, on_round_trip: Callable[[RoundTrip], None
         return loop.done.triggered
 
 
-def _gather(
-    transport: Transport, environment: WallEnvironment, start: simpy.Event, options: ClientOptions
+def gather(
+    transport: Transport,
+    environment: WallEnvironment,
+    start: simpy.Event,
+    group: str,
+    name: str,
+    members: int,
 ) -> None:
-    """Let `start` happen once all members of the group have announced that they are warm."""
+    """Let `start` happen once so many members of the group, this one included, have announced themselves."""
     present: set[str] = set()
 
     def on_change(key: str, alive: bool) -> None:
         # One that has finished and gone was there all the same.
         if alive:
             present.add(key)
-        if len(present) >= options.members:
+        if len(present) >= members:
             environment.post(succeed_once, start)
 
-    prefix = f"reconros/clients/{options.group}"
+    prefix = f"reconros/clients/{group}"
     transport.watch_tokens(f"{prefix}/*", on_change)
-    transport.declare_token(f"{prefix}/{options.name}")
+    transport.declare_token(f"{prefix}/{name}")

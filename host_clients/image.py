@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     import numpy as np
@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from reconros_zenoh.ros.types import TypeRegistry
 
 
-def image_message(types: TypeRegistry, encoding: str, picture: NDArray[np.uint8]) -> object:
+def image_message(types: TypeRegistry, encoding: str, picture: NDArray[np.uint8]) -> Any:
     """Return the message of a picture, uint8[height, width] or uint8[height, width, channels]."""
     header = types.message("std_msgs/msg/Header").cls(
         stamp=types.message("builtin_interfaces/msg/Time").cls(sec=0, nanosec=0), frame_id=""

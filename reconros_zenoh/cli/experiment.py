@@ -9,6 +9,7 @@ from typing import Annotated, Any
 import typer
 from rich.console import Console
 
+from reconros_zenoh.cli.design import design
 from reconros_zenoh.cli.gateway_experiment import gateway
 from reconros_zenoh.cli.options import ClockName, Out, Profile, Seed
 from reconros_zenoh.cli.progress import ExperimentProgress
@@ -28,6 +29,7 @@ from reconros_zenoh.project.loader import load_project
 app = typer.Typer(help="Run an experiment of the papers on emulated boards.", no_args_is_help=True)
 app.command("callbacks")(callbacks)
 app.command("reconfiguration")(reconfiguration)
+app.command("design")(design)
 app.command("gateway")(gateway)
 
 MAPPINGS = ("all_software", "mixed", "all_hardware")

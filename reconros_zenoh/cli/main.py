@@ -23,6 +23,8 @@ _VERBS = {
     "router": ("daemons", "router"),
     "board": ("daemons", "board"),
     "client": ("daemons", "client"),
+    "camera": ("desktop", "camera"),
+    "viewer": ("desktop", "viewer"),
     "status": ("daemons", "status"),
     "new": ("new", "new"),
     "check": ("check", "check"),

@@ -11,9 +11,11 @@ from typer.main import get_command
 
 from board_daemon.hosting import BoardOptions
 from deploy.compose import Condition, read_compose
+from host_clients.camera import CameraOptions
 from host_clients.daemon import ClientOptions
+from host_clients.desktop import ViewerOptions
 from reconros_zenoh.board.profile import read_profile
-from reconros_zenoh.cli import daemons
+from reconros_zenoh.cli import daemons, desktop
 from reconros_zenoh.errors import FileError, UsageError
 from reconros_zenoh.experiments.deployment import BoardPlan, DeploymentPlan
 from reconros_zenoh.experiments.roundtrip import application_folder
@@ -24,19 +26,24 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
     from deploy.compose import Service
+    from reconros_zenoh.board.profile import Profile
+    from reconros_zenoh.project.loader import Project
 
 _VERBS: dict[str, Callable[..., None]] = {
     "board": daemons.board,
     "client": daemons.client,
+    "camera": desktop.camera,
+    "viewer": desktop.viewer,
     "router": daemons.router,
 }
 
 
 def read_deployment(path: Path, environment: Mapping[str, str]) -> DeploymentPlan:
-    """Return the boards and clients of a Compose file; nothing is started.
+    """Return the boards, clients, cameras and viewers of a Compose file; nothing is started.
 
-    FileError names the service whose command cannot be simulated: another one than `reconros board`, `client`
-    and `router`, options that these would refuse, a profile without modelled times, a client without a board.
+    FileError names the service whose command cannot be simulated: another one than `reconros board`,
+    `client`, `camera`, `viewer` and `router`, options that these would refuse, a profile without modelled
+    times, a client or camera without a board.
     """
     services = read_compose(path, environment).services
     nodes = Node.read(path, environment).mapping()["services"].mapping()
@@ -44,6 +51,8 @@ def read_deployment(path: Path, environment: Mapping[str, str]) -> DeploymentPla
     profiles = functools.cache(read_profile)
     boards: dict[str, BoardPlan] = {}
     clients: dict[str, ClientOptions] = {}
+    cameras: dict[str, CameraOptions] = {}
+    viewers: dict[str, ViewerOptions] = {}
     for name, service in services.items():
         command = nodes[name].mapping()["command"]
         if Condition.COMPLETED in service.depends_on.values():
@@ -53,23 +62,10 @@ def read_deployment(path: Path, environment: Mapping[str, str]) -> DeploymentPla
             )
         verb, given = _parse(service, command)
         if verb == "board":
-            try:
-                project = projects(given["project"] or application_folder())
-                mapping, profile = project.mapping(given["mapping"]), profiles(given["profile"])
-            except FileError:
-                raise
-            except UsageError as error:
-                raise command.error(f"cannot be run: {error}", "Correct the option.") from None
-            if profile.model is None:
-                raise command.error(
-                    f"takes the profile {given['profile']!r}, which models nothing: nothing would take any "
-                    "virtual time.",
-                    "Give another --profile.",
-                )
-            if given["name"] in [board.options.name for board in boards.values()]:
-                raise command.error(f"names a second board {given['name']!r}.", "Give each a --name.")
-            options = BoardOptions(given["name"], given["domain"], given["seed"], given["bitstreams"])
-            boards[name] = BoardPlan(profile, project, mapping, options)
+            board = _board_plan(given, command, projects, profiles)
+            if board.options.name in [other.options.name for other in boards.values()]:
+                raise command.error(f"names a second board {board.options.name!r}.", "Give each a --name.")
+            boards[name] = board
         elif verb == "client":
             clients[name] = ClientOptions(
                 str(given["name"]),
@@ -82,9 +78,39 @@ def read_deployment(path: Path, environment: Mapping[str, str]) -> DeploymentPla
                 given["group"],
                 given["members"],
             )
-    plan = DeploymentPlan(boards, clients)
+        elif verb == "camera":
+            cameras[name] = CameraOptions(
+                given["router"], given["pictures"], given["rate"], given["wait"], given["domain"]
+            )
+        elif verb == "viewer":
+            viewers[name] = ViewerOptions(given["router"], domain=given["domain"])
+    plan = DeploymentPlan(boards, clients, cameras, viewers)
     _check_clients(plan, nodes)
     return plan
+
+
+def _board_plan(
+    given: Mapping[str, Any],
+    command: Node,
+    projects: Callable[[Path], Project],
+    profiles: Callable[[str], Profile],
+) -> BoardPlan:
+    """Return what the options of `reconros board` ask for."""
+    try:
+        project = projects(given["project"] or application_folder())
+        mapping, profile = project.mapping(given["mapping"]), profiles(given["profile"])
+    except FileError:
+        raise
+    except UsageError as error:
+        raise command.error(f"cannot be run: {error}", "Correct the option.") from None
+    if profile.model is None:
+        raise command.error(
+            f"takes the profile {given['profile']!r}, which models nothing: nothing would take any "
+            "virtual time.",
+            "Give another --profile.",
+        )
+    options = BoardOptions(given["name"], given["domain"], given["seed"], given["bitstreams"])
+    return BoardPlan(profile, project, mapping, options)
 
 
 def _parse(service: Service, command: Node) -> tuple[str, dict[str, Any]]:
@@ -93,8 +119,7 @@ def _parse(service: Service, command: Node) -> tuple[str, dict[str, Any]]:
     if PurePath(program).name != "reconros" or not words or words[0] not in _VERBS:
         raise command.error(
             f"cannot be simulated: {' '.join(service.command)!r}.",
-            "Simulated are `reconros board`, `reconros client` and `reconros router`; for all else use "
-            "`reconros up`.",
+            f"Simulated are `reconros {'`, `reconros '.join(_VERBS)}`; for all else use `reconros up`.",
         )
     verb, *arguments = words
     parser = _parser(verb)
@@ -127,15 +152,20 @@ def _parser(verb: str) -> Any:
 
 
 def _check_clients(plan: DeploymentPlan, nodes: Mapping[str, Node]) -> None:
-    """Raise FileError for a client that could never begin, and when there is none."""
-    if not plan.clients:
+    """Raise FileError for a client or camera that could never begin, and when there is none."""
+    if not plan.clients and not plan.cameras:
         raise next(iter(nodes.values())).error("and the others are no clients.", "Add a `reconros client`.")
+    domains = {name: client.domain for name, client in plan.clients.items()}
+    domains |= {name: camera.domain for name, camera in plan.cameras.items()}
+    for name, domain in domains.items():
+        if not plan.place(domain):
+            raise (
+                nodes[name]
+                .mapping()["command"]
+                .error(f"asks in domain {domain}, where no board is.", "Give a board the same --domain.")
+            )
     for name, client in plan.clients.items():
         command = nodes[name].mapping()["command"]
-        if not plan.place(client):
-            raise command.error(
-                f"asks in domain {client.domain}, where no board is.", "Give a board the same --domain."
-            )
         group = {other.name for other in plan.clients.values() if other.group == client.group}
         if client.group is not None and len(group) < client.members:
             raise command.error(

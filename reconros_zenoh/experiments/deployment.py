@@ -18,7 +18,9 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from board_daemon.hosting import BoardOptions
+    from host_clients.camera import CameraOptions
     from host_clients.daemon import ClientOptions
+    from host_clients.desktop import ViewerOptions
     from reconros_zenoh.board.profile import Profile
     from reconros_zenoh.measure.record import RoundTrip
     from reconros_zenoh.project.loader import Project
@@ -37,13 +39,15 @@ class BoardPlan:
 
 @dataclass(frozen=True, slots=True)
 class DeploymentPlan:
-    """The boards and the clients of a deployment, each by the name of its service."""
+    """The boards, clients, cameras and viewers of a deployment, each by the name of its service."""
 
     boards: Mapping[str, BoardPlan]
     clients: Mapping[str, ClientOptions]
+    cameras: Mapping[str, CameraOptions]
+    viewers: Mapping[str, ViewerOptions]
 
     def changed(self, requests: int | None, seed: int | None) -> DeploymentPlan:
-        """Return the same with another number of requests and another seed, where one is given."""
+        """Return the same with another number of requests or pictures and another seed, where given."""
         boards = {
             service: replace(
                 board,
@@ -59,7 +63,11 @@ class DeploymentPlan:
             )
             for service, client in self.clients.items()
         }
-        return DeploymentPlan(boards, clients)
+        cameras = {
+            service: replace(camera, pictures=requests or camera.pictures)
+            for service, camera in self.cameras.items()
+        }
+        return DeploymentPlan(boards, clients, cameras, self.viewers)
 
     def clone(self, number: int) -> DeploymentPlan:
         """Return the same with `-number` behind the names of the boards.
@@ -73,27 +81,30 @@ class DeploymentPlan:
         }
         return replace(self, boards=boards)
 
-    def place(self, client: ClientOptions) -> str:
-        """Return the name of the board in the client's domain; of several, their names joined by `+`."""
+    def place(self, domain: int) -> str:
+        """Return the name of the board in this domain; of several, their names joined by `+`."""
         return "+".join(
-            board.options.name for board in self.boards.values() if board.options.domain == client.domain
+            board.options.name for board in self.boards.values() if board.options.domain == domain
         )
 
 
 class DeploymentRun:
     """Deployments that run beside each other, each on a network of its own.
 
-    `round_trips` holds those of each client, by the names of board and service.
+    `round_trips` holds those of each client, by the names of board and service; those of a viewer are the
+    pictures, and those of its control loop have the name of its service with `_control` behind it.
     """
 
     def __init__(self, plans: Sequence[DeploymentPlan]) -> None:
         self._plans = plans
         self.requests = sum(client.requests for plan in plans for client in plan.clients.values())
+        self.requests += sum(camera.pictures for plan in plans for camera in plan.cameras.values())
         self.round_trips: dict[str, dict[str, list[RoundTrip]]] = {}
         self.simulated_ns = 0
+        self._may_lose: set[str] = set()
 
     def run(self, on_round_trip: Callable[[], None]) -> None:
-        """Return when all clients are done; raise UsageError or TransportError when one cannot be."""
+        """Return when all clients and cameras are done; raise UsageError or TransportError otherwise."""
         with Simulation(TypeRegistry()) as simulation:
             for plan in self._plans:
                 simulation.begin_network()
@@ -103,22 +114,33 @@ class DeploymentRun:
                     except UsageError as error:
                         raise UsageError(f"{service}: {error}") from error
                 for service, client in plan.clients.items():
-                    trips = self.round_trips.setdefault(plan.place(client), {}).setdefault(service, [])
+                    trips = self.round_trips.setdefault(plan.place(client.domain), {}).setdefault(service, [])
 
                     def record(round_trip: RoundTrip, trips: list[RoundTrip] = trips) -> None:
                         trips.append(round_trip)
                         on_round_trip()
 
                     simulation.add_client(client, record)
+                for service, viewer in plan.viewers.items():
+                    pictures, indices = (
+                        self.round_trips.setdefault(plan.place(viewer.domain), {}).setdefault(name, [])
+                        for name in (service, f"{service}_control")
+                    )
+                    simulation.add_viewer(
+                        viewer.domain, pictures.append, indices.append, lambda _: on_round_trip()
+                    )
+                    self._may_lose.add(service)
+                for camera in plan.cameras.values():
+                    simulation.add_camera(camera)
             simulation.run()
             self.simulated_ns = simulation.environment.now
 
     def all_right(self) -> bool:
-        """Tell whether every answer came and was right."""
+        """Tell whether every answer came and was right; pictures, sent with best effort, may be lost."""
         return all(
-            trip.outcome == "ok"
+            trip.outcome == "ok" or (trip.outcome == "lost" and service in self._may_lose)
             for services in self.round_trips.values()
-            for trips in services.values()
+            for service, trips in services.items()
             for trip in trips
         )
 

@@ -9,8 +9,11 @@ from itertools import count
 from typing import TYPE_CHECKING, Self
 
 from board_daemon.hosting import HostedBoard
+from host_clients.camera import Camera
 from host_clients.closed_loop import ClosedLoop
+from host_clients.scope import Scope
 from host_clients.suite import exchange
+from host_clients.viewer import Viewer
 from reconros_zenoh.clock.virtual import VirtualEnvironment, succeed_once
 from reconros_zenoh.errors import TransportError
 from reconros_zenoh.rmw.node import Context
@@ -20,9 +23,12 @@ from reconros_zenoh.transport.simulated import SimulatedNetwork
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    import numpy as np
     import simpy
+    from numpy.typing import NDArray
 
     from board_daemon.hosting import BoardOptions
+    from host_clients.camera import CameraOptions
     from host_clients.daemon import ClientOptions
     from reconros_zenoh.board.profile import Profile
     from reconros_zenoh.measure.record import RoundTrip
@@ -32,7 +38,7 @@ if TYPE_CHECKING:
 
 
 class Simulation:
-    """Boards and clients in one event loop until all clients are done.
+    """Boards and clients in one event loop until all clients and cameras are done.
 
     The same boards and clients, added in the same order, give the same round trips on any machine.
     What does not change is held once, whatever their number: message types, the requests of clients with one
@@ -46,7 +52,7 @@ class Simulation:
         self._sessions = count(1)
         self._types = types
         self._exchange = cache(exchange)
-        self._loops: list[ClosedLoop] = []
+        self._done: list[simpy.Event] = []
         self._closing = ExitStack()
         self.begin_network()
 
@@ -76,9 +82,7 @@ class Simulation:
 
     def add_client(self, options: ClientOptions, on_round_trip: Callable[[RoundTrip], None]) -> None:
         """Have a client make its round trips; `router` says nothing here."""
-        context = Context(
-            self._network.transport(f"{next(self._sessions):x}"), options.domain, self.environment.clock_ns
-        )
+        context = self.context(options.domain)
         start = self.environment.event()
         loop = ClosedLoop(
             self.environment,
@@ -91,7 +95,7 @@ class Simulation:
             start=start,
             on_round_trip=on_round_trip,
         )
-        self._loops.append(loop)
+        self._done.append(loop.done)
         self.environment.call_later(round(options.wait_s * 1e9), _check_answered, loop, options)
         if options.group is None:
             start.succeed()
@@ -99,9 +103,33 @@ class Simulation:
             group = self._groups.setdefault(options.group, _Group())
             group.join(options, loop, start)
 
+    def add_camera(self, options: CameraOptions) -> Camera:
+        """Return a camera that begins at once; `router` and `group` say nothing here."""
+        start = self.environment.event().succeed()
+        camera = Camera(self.environment, self.context(options.domain), self._types, options, start)
+        self._done.append(camera.done)
+        return camera
+
+    def add_viewer(
+        self,
+        domain: int,
+        on_picture_trip: Callable[[RoundTrip], None],
+        on_control_trip: Callable[[RoundTrip], None],
+        on_picture: Callable[[NDArray[np.uint8]], None] = lambda _: None,
+    ) -> None:
+        """Have the pictures and the control loop of the design example observed; see `Viewer` and `Scope`."""
+        context = self.context(domain)
+        Viewer(self.environment, context, self._types, on_picture_trip, on_picture)
+        Scope(self.environment, context, self._types, on_control_trip)
+
+    def context(self, domain: int = 0) -> Context:
+        """Return a new session for nodes of one's own."""
+        transport = self._network.transport(f"{next(self._sessions):x}")
+        return Context(transport, domain, self.environment.clock_ns)
+
     def run(self) -> None:
-        """Return when all clients are done; raise TransportError when one is never answered."""
-        self.environment.run(until=self.environment.all_of([loop.done for loop in self._loops]))
+        """Return when all clients and cameras are done; raise TransportError when one is never answered."""
+        self.environment.run(until=self.environment.all_of(self._done))
 
 
 class _Group:

@@ -121,7 +121,8 @@ def spans_figure(spans: Mapping[str, Mapping[str, Mapping[str, float]]]) -> Figu
         grid[0].invert_yaxis()
         figure.supxlabel("mean time [ms]")
         handles, labels = grid[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside upper left", ncols=len(colours))
+        columns = min(len(colours), 2 * len(clients) + 1)
+        figure.legend(handles, labels, loc="outside upper left", ncols=columns)
     return figure
 
 

@@ -5,10 +5,9 @@ from __future__ import annotations
 from html import escape
 from typing import TYPE_CHECKING, Any
 
-from reconros_zenoh.errors import UsageError
 from reconros_zenoh.measure.compare import MODULO_NOTE, grade
 from reconros_zenoh.measure.findings import findings, host_troubles
-from reconros_zenoh.measure.markup import table
+from reconros_zenoh.measure.markup import figure, table, write_page
 from reconros_zenoh.measure.plots import grid_figure, inline_svg, spans_figure
 from reconros_zenoh.measure.reference.zynq7100 import (
     PRINTED_SPEEDUPS_OF_MEANS,
@@ -26,30 +25,12 @@ if TYPE_CHECKING:
     from reconros_zenoh.measure.markup import Cell
     from reconros_zenoh.measure.record import Record
 
+_TITLE = "Round-trip times in software and in hardware"
+
 _CLOCKS = {
     "virtual": "Virtual time: the board is simulated event by event; the same seed gives the same figures.",
     "wall": "Wall time: board and clients are processes of their own that talk over a network in real time.",
 }
-
-_STYLE = """
-:root { color-scheme: light dark; --paper: #ffffff; --ink: #24292f; --grey: #8b949e; --line: #d8dee4;
-  --soft: #f6f8fa; --good: #1a7f37; --fair: #9a6700; --bad: #cf222e; }
-@media (prefers-color-scheme: dark) { :root { --paper: #0f1318; --ink: #e6edf3; --line: #30363d;
-  --soft: #171c23; --good: #3fb950; --fair: #d29922; --bad: #ff7b72; } }
-body { margin: 0 auto; padding: 1.5rem; max-width: 75rem; background: var(--paper); color: var(--ink);
-  font: 16px/1.55 system-ui, sans-serif; }
-h1 { line-height: 1.2; } h2 { margin-top: 2.5rem; border-bottom: 1px solid var(--line); }
-p, li, figcaption { max-width: 52rem; }
-figure { margin: 1rem 0; } figcaption, .small { font-size: 0.87rem; opacity: 0.85; }
-.wide { overflow-x: auto; } .wide svg { display: block; width: 100%; min-width: 56rem; height: auto; }
-table { border-collapse: collapse; font-size: 0.9rem; font-variant-numeric: tabular-nums; }
-th, td { padding: 0.25rem 0.7rem; border-bottom: 1px solid var(--line); text-align: right; }
-th { background: var(--soft); font-weight: 600; }
-th:nth-child(-n+2), td:nth-child(-n+2) { text-align: left; }
-.good { color: var(--good); } .fair { color: var(--fair); } .bad { color: var(--bad); }
-.bar { display: inline-block; height: 0.7em; background: var(--grey); vertical-align: baseline; }
-.warning { border-left: 4px solid var(--bad); background: var(--soft); padding: 0.6rem 1rem; }
-"""
 
 
 def write_report(
@@ -64,25 +45,15 @@ def write_report(
     and `variants`, a list of `off` and `accuracy` with the complete model first. The file is complete or
     not there: it replaces an older one at the end. Raises UsageError if it cannot be written.
     """
-    page = _page(experiments, records, ablation)
-    partial = path.with_name(path.name + ".partial")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        partial.write_text(page, encoding="utf-8")
-        partial.replace(path)
-    except OSError as error:
-        raise UsageError(
-            f"{path}: the report cannot be written: {error.strerror}. Choose a folder that you may write to."
-        ) from error
+    write_page(path, _TITLE, _parts(experiments, records, ablation))
 
 
-def _page(
+def _parts(
     experiments: Sequence[Mapping[str, Any]],
     records: Sequence[Mapping[str, Mapping[str, Record]]],
     ablation: Mapping[str, Any] | None,
-) -> str:
-    title = "Round-trip times in software and in hardware"
-    parts = [f"<h1>{escape(title)}</h1>", _introduction(experiments), "<h2>In short</h2>"]
+) -> list[str]:
+    parts = [_introduction(experiments), "<h2>In short</h2>"]
     parts += [_summary(experiment) for experiment in experiments]
     for experiment, its_records in zip(experiments, records, strict=True):
         parts += _section(experiment, its_records)
@@ -90,13 +61,7 @@ def _page(
     notes = "".join(f"<li>{escape(note)}</li>" for note in reference_notes())
     parts += [f"<h2>The real board's data</h2><ul>{notes}<li>{escape(SWAPPED_COLUMNS)}</li></ul>"]
     parts += ["<h2>How it was made</h2>", *(_origin(experiment) for experiment in experiments)]
-    return (
-        '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">'
-        f"<title>{escape(title)}</title><style>{_STYLE}</style></head>\n<body>\n"
-        + "\n".join(parts)
-        + "\n</body></html>\n"
-    )
+    return parts
 
 
 def _introduction(experiments: Sequence[Mapping[str, Any]]) -> str:
@@ -139,7 +104,7 @@ def _section(experiment: Mapping[str, Any], records: Mapping[str, Mapping[str, R
         )
     parts += [
         "<h3>How often each round-trip time occurred</h3>",
-        _figure(
+        figure(
             inline_svg(grid_figure(records)),
             "Round-trip times per client and mapping",
             "Coloured: this run. Dashed: its mean. Grey: the real board, where it was measured (modulo 1 s). "
@@ -156,7 +121,7 @@ def _section(experiment: Mapping[str, Any], records: Mapping[str, Mapping[str, R
     if any(spans.values()):
         parts += [
             "<h3>Where the time goes</h3>",
-            _figure(
+            figure(
                 inline_svg(spans_figure(spans)),
                 "Mean time per stage, client and mapping",
                 "The mean time of each stage on a message's way, from the request to the answer. The stages "
@@ -271,8 +236,3 @@ def _by_client(cells: Mapping[str, Mapping[str, Any]]) -> list[tuple[str, str, A
         for mapping, row in cells.items()
         if client in row
     ]
-
-
-def _figure(svg: str, label: str, caption: str) -> str:
-    drawing = svg.replace("<svg ", f'<svg role="img" aria-label="{escape(label)}" ', 1)
-    return f'<figure><div class="wide">{drawing}</div><figcaption>{escape(caption)}</figcaption></figure>'

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 
 ROOT = Path(__file__).parents[2]
 ROUNDTRIP = ROOT / "deploy" / "roundtrip.yaml"
+DESIGN = ROOT / "deploy" / "design_example.yaml"
 CLIENTS = {"sort", "inverse", "sobel", "mnist", "hash"}
 CELL_KEYS = {"n", "lost", "wrong", "median_ms", "p95_ms", "p99_ms"}
 ECHO = ROOT / "tests" / "benchmarks" / "echo"
@@ -66,6 +67,21 @@ def test_the_file_of_up_gives_a_record_and_a_row_per_board_and_client(tmp_path: 
     assert records(tmp_path).keys() == {f"board0/{client}.csv" for client in CLIENTS}
     rows = [line.split() for line in output.splitlines() if line.startswith("board0")]
     assert {row[1]: row[2:5] for row in rows} == {client: ["3", "0", "0"] for client in CLIENTS}
+
+
+def test_the_design_example_is_simulated_from_the_file_of_up(tmp_path: Path) -> None:
+    output = run("-f", DESIGN, "--requests", 10, "--out", tmp_path, "--json")
+    board = json.loads(output)["boards"]["vision+control"]
+    assert records(tmp_path).keys() == {f"vision+control/{name}.csv" for name in ("viewer", "viewer_control")}
+    assert 0 < board["viewer"]["n"] <= 10
+    assert board["viewer_control"]["n"] > 15
+    assert {cell["wrong"] for cell in board.values()} == {0}
+
+
+def test_a_camera_in_a_domain_without_a_board_is_refused(tmp_path: Path) -> None:
+    file = write_deployment(tmp_path, BOARD, "reconros camera --domain=3")
+    with pytest.raises(FileError, match=r"file\.yaml:5: .* asks in domain 3, where no board is"):
+        run("-f", file, "--out", tmp_path)
 
 
 def test_the_same_seed_gives_the_same_bytes_and_another_seed_others(tmp_path: Path) -> None:

@@ -1,0 +1,124 @@
+"""Camera and viewer of the design example as processes: from their arguments until their end or a signal."""
+
+from __future__ import annotations
+
+import signal
+from contextlib import ExitStack
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from host_clients.camera import Camera
+from host_clients.daemon import gather
+from host_clients.gallery import Gallery
+from host_clients.picture_server import PictureServer
+from host_clients.scope import Scope
+from host_clients.viewer import Viewer
+from reconros_zenoh.clock.virtual import succeed_once
+from reconros_zenoh.clock.wall import WallEnvironment, keep_time
+from reconros_zenoh.measure.record import RecordWriter
+from reconros_zenoh.rmw.node import Context
+from reconros_zenoh.ros.types import TypeRegistry
+from reconros_zenoh.transport.memory import tune_memory
+from reconros_zenoh.transport.zenoh import ZenohTransport
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    import numpy as np
+    import simpy
+    from numpy.typing import NDArray
+
+    from host_clients.camera import CameraOptions
+    from reconros_zenoh.measure.record import RoundTrip
+
+
+@dataclass(frozen=True, slots=True)
+class ViewerOptions:
+    """What a viewer is told: where its records and pictures go, and the port of its page if there is one."""
+
+    router: str
+    out: Path | None = None
+    view: int | None = None
+    rate_hz: float = 5.0
+    domain: int = 0
+    group: str | None = None
+    members: int = 1
+
+
+def run_camera(options: CameraOptions, on_ready: Callable[[], None]) -> int:
+    """Publish the pictures and return how many were: fewer than asked for after SIGINT or SIGTERM.
+
+    `on_ready` is called when a signal would end it. Raise TransportError when there is no router, or nobody
+    subscribes within `wait_s`.
+    """
+    environment, stop = _begin()
+    with ZenohTransport.open(options.router) as transport:
+        start = environment.event()
+        camera = Camera(environment, Context(transport, options.domain), TypeRegistry(), options, start)
+        if options.group is None:
+            start.succeed()
+        else:
+            gather(transport, environment, start, options.group, "camera", options.members)
+        on_ready()
+        environment.run(until=camera.done | stop)
+        camera.close()
+        return camera.sent
+
+
+def run_viewer(options: ViewerOptions, on_ready: Callable[[str | None], None]) -> dict[str, int]:
+    """Record what comes until SIGINT or SIGTERM; return how many pictures and servo indices came.
+
+    `on_ready` gets the address of the page, None without one. Records are filter.csv and control.csv.
+    Raise TransportError when there is no router, UsageError when a file cannot be written.
+    """
+    environment, stop = _begin()
+    counts = {"pictures": 0, "indices": 0}
+    gallery = Gallery()
+    with ExitStack() as closing:
+        transport = closing.enter_context(ZenohTransport.open(options.router))
+        records = {
+            name: closing.enter_context(RecordWriter(options.out / f"{name}.csv"))
+            for name in ("filter", "control")
+            if options.out is not None
+        }
+        server = None if options.view is None else closing.enter_context(PictureServer(options.view))
+
+        def record(name: str, kind: str) -> Callable[[RoundTrip], None]:
+            def write(trip: RoundTrip) -> None:
+                counts[kind] += trip.outcome != "lost"
+                if name in records:
+                    records[name].write(trip)
+
+            return write
+
+        def show(picture: NDArray[np.uint8]) -> None:
+            gallery.add(picture)
+            if server is not None:
+                server.show(picture)
+
+        context, types = Context(transport, options.domain), TypeRegistry()
+        nodes = (
+            Viewer(environment, context, types, record("filter", "pictures"), show),
+            Scope(environment, context, types, record("control", "indices")),
+        )
+        on_ready(None if server is None else server.url)
+        if options.group is not None:
+            gather(transport, environment, environment.event(), options.group, "viewer", options.members)
+        environment.run(until=stop)
+        for node in nodes:
+            node.close()
+    if options.out is not None:
+        gallery.write(options.out, options.rate_hz)
+    return counts
+
+
+def _begin() -> tuple[WallEnvironment, simpy.Event]:
+    """Return an event loop and the event that a signal makes happen."""
+    keep_time()
+    tune_memory()
+    environment = WallEnvironment()
+    stop = environment.event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: environment.post(succeed_once, stop))
+    return environment, stop

@@ -1,0 +1,1 @@
+"""The board with the slots: /filter and /inv_kinematics."""

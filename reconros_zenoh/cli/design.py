@@ -1,0 +1,104 @@
+"""`reconros experiment design`: the design example, with a shared slot and with two."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from rich.box import SIMPLE_HEAD
+from rich.console import Console
+from rich.table import Table
+
+from reconros_zenoh.board.profile import read_profile
+from reconros_zenoh.cli.options import AsJson, ClockName, Out, Profile, Seed
+from reconros_zenoh.cli.progress import run_bar
+from reconros_zenoh.errors import UsageError
+from reconros_zenoh.measure.statistics import format_ms
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+_ROWS = {
+    "reconfigurations": "reconfigurations",
+    "reconfiguration_ms": "time in them",
+    "frames_in": "pictures taken",
+    "frames_out": "pictures filtered",
+    "control_out": "servo indices",
+    "wrong": "wrong",
+}
+
+
+def design(
+    clock: Annotated[
+        ClockName, typer.Option(help="Real time with processes, or virtual time.")
+    ] = ClockName.WALL,
+    seconds: Annotated[
+        float,
+        typer.Option(min=1, max=86400, metavar="SECONDS", help="How long the camera runs, per variant."),
+    ] = 20.0,
+    seed: Seed = 0,
+    out: Out = Path("results/design"),
+    profile: Profile = "miniitx-zynq7100",
+    view: Annotated[
+        bool, typer.Option("--view", help="Show the filtered pictures in the browser (wall time).")
+    ] = False,
+    as_json: AsJson = False,
+) -> None:
+    """Section IV: /filter and /inv_kinematics in one reconfigurable slot, and in two; writes report.html.
+
+    Exit status 0 only if pictures and servo indices came, and all that came were right.
+    """
+    from reconros_zenoh.experiments.design import VARIANTS, DesignPlan, all_right, finish, prepare
+    from reconros_zenoh.experiments.design_pictures import pictures_of
+    from reconros_zenoh.measure.design_report import write_design_report
+
+    modelled = read_profile(profile).model is not None
+    if clock is ClockName.VIRTUAL and not modelled:
+        raise UsageError(
+            f"profile {profile!r} models nothing, so nothing would take any virtual time. Use --clock wall."
+        )
+    if clock is ClockName.VIRTUAL and view:
+        raise UsageError("--view shows pictures as they come, which needs --clock wall.")
+    plan = DesignPlan(clock.value, seconds, seed, profile, out)
+    prepare(plan)
+    with run_bar("design example", len(VARIANTS), quiet=as_json) as advance:
+        if clock is ClockName.VIRTUAL:
+            from reconros_zenoh.experiments.design_virtual import run_design_virtual
+
+            statuses = run_design_virtual(plan, advance)
+        else:
+            from reconros_zenoh.experiments.design_wall import run_design_wall
+            from reconros_zenoh.experiments.wall import free_port
+
+            port = free_port() if view else None
+            if view:
+                Console(stderr=True).print(f"the pictures are at http://127.0.0.1:{port}/")
+            statuses = run_design_wall(plan, advance, port)
+    experiment = finish(plan, statuses)
+    report = plan.folder / "report.html"
+    write_design_report(report, experiment, pictures_of(plan))
+    if as_json:
+        print(json.dumps(experiment))
+    else:
+        _print_table(Console(), experiment["variants"])
+        print(f"report: {report}")
+    raise typer.Exit(0 if all_right(experiment) else 1)
+
+
+def _print_table(console: Console, variants: Mapping[str, Mapping[str, Any]]) -> None:
+    table = Table(box=SIMPLE_HEAD, padding=0, show_edge=False)
+    table.add_column("")
+    for variant in variants:
+        table.add_column(variant, justify="right", no_wrap=True)
+    for key, text in _ROWS.items():
+        cells = (variant[key] for variant in variants.values())
+        table.add_row(text, *(format_ms(cell) if key.endswith("_ms") else str(cell) for cell in cells))
+    for chain, text in (("filter_ms", "camera to viewer"), ("control_ms", "command to servo index")):
+        for point in ("median", "p95"):
+            table.add_row(
+                f"{text}, {point}", *(format_ms(variant[chain][point]) for variant in variants.values())
+            )
+    console.print(table)
+    console.print("Times in ms.", style="dim")

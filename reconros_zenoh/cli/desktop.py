@@ -1,0 +1,79 @@
+"""`reconros camera` and `reconros viewer`: the desktop of the design example."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from reconros_zenoh.cli.options import ENDPOINT, Domain, Router
+
+Rate = Annotated[
+    float,
+    typer.Option(min=0.1, max=1000, metavar="HZ", help="How many pictures per second the camera takes."),
+]
+Group = Annotated[
+    str | None, typer.Option(help="Begin together with the others of this group.", show_default=False)
+]
+Members = Annotated[int, typer.Option(min=1, help="How many the group has.")]
+
+
+def camera(
+    pictures: Annotated[int, typer.Option(min=1, help="How many pictures to publish.")] = 100,
+    rate: Rate = 5.0,
+    router: Router = ENDPOINT,
+    domain: Domain = 0,
+    wait: Annotated[
+        float, typer.Option(min=0.1, max=86400, metavar="SECONDS", help="How long to wait for a subscriber.")
+    ] = 30.0,
+    group: Group = None,
+    members: Members = 1,
+) -> None:
+    """Publish a moving test picture on /image_raw, and end 2 s after the last."""
+    from host_clients.camera import CameraOptions
+    from host_clients.desktop import run_camera
+
+    options = CameraOptions(router, pictures, rate, wait, domain, group, members)
+    sent = run_camera(options, lambda: print("camera: ready", flush=True))
+    print(f"camera: {sent} pictures published", flush=True)
+    raise typer.Exit(0 if sent == pictures else 130)
+
+
+def viewer(
+    rate: Rate = 5.0,
+    router: Router = ENDPOINT,
+    domain: Domain = 0,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="DIR",
+            help="Where last.png, filtered.gif, filter.csv and control.csv go.",
+            show_default=False,
+        ),
+    ] = None,
+    view: Annotated[
+        int | None,
+        typer.Option(
+            min=0,
+            max=65535,
+            metavar="PORT",
+            envvar="RECONROS_VIEW",
+            help="Show the pictures in the browser, at this port of 127.0.0.1; 0 takes a free one.",
+            show_default=False,
+        ),
+    ] = None,
+    group: Group = None,
+    members: Members = 1,
+) -> None:
+    """Take the pictures of /image_filtered and check them, until Ctrl-C; measure the control loop as well."""
+    from host_clients.desktop import ViewerOptions, run_viewer
+
+    def tell(url: str | None) -> None:
+        print("viewer: ready" + (f", the pictures are at {url}" if url else ""), flush=True)
+
+    counts = run_viewer(ViewerOptions(router, out, view, rate, domain, group, members), tell)
+    print(
+        f"viewer: {counts['pictures']} filtered pictures and {counts['indices']} servo indices came",
+        flush=True,
+    )

@@ -1,0 +1,149 @@
+"""The design example (ReconROS Executor, Section IV): what is run, and what comes out."""
+
+from __future__ import annotations
+
+import json
+import os
+import platform
+import shlex
+import sys
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from importlib.metadata import version
+from importlib.resources import files
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from reconros_zenoh.errors import UsageError
+from reconros_zenoh.measure.record import read_record
+from reconros_zenoh.measure.statistics import summarise
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from reconros_zenoh.experiments.roundtrip import Clock
+
+VARIANTS = ("one_slot", "two_slots")
+"""Mappings of the project `vision`, the one of the paper first."""
+
+RATE_HZ = 5.0
+"""Pictures per second. The communication stack of the measured board is busy with one for some 80 ms."""
+
+FILES = ("filter.csv", "control.csv", "first.png", "last.png", "filtered.gif")
+_PERCENTILES = {"median": 50.0, "p95": 95.0}
+
+
+def projects_folder() -> Path:
+    """Return the folder that holds the projects `vision` and `control`."""
+    return Path(str(files("reconros_zenoh.applications.design_example")))
+
+
+@dataclass(frozen=True, slots=True)
+class DesignPlan:
+    """One run of the experiment, all but the mapping alike for each variant."""
+
+    clock: Clock
+    seconds: float
+    seed: int
+    profile: str
+    out: Path
+
+    @property
+    def pictures(self) -> int:
+        """How many pictures the camera takes."""
+        return max(1, round(self.seconds * RATE_HZ))
+
+    @property
+    def folder(self) -> Path:
+        """Where this clock's records, pictures and experiment.json go."""
+        return self.out / self.clock
+
+    def variant_folder(self, variant: str) -> Path:
+        """Where the records and pictures of a variant go."""
+        return self.folder / variant
+
+
+def prepare(plan: DesignPlan) -> None:
+    """Make the folders of the run, without what an earlier run left; raise UsageError if that fails."""
+    try:
+        for variant in VARIANTS:
+            plan.variant_folder(variant).mkdir(parents=True, exist_ok=True)
+            for name in FILES:
+                (plan.variant_folder(variant) / name).unlink(missing_ok=True)
+    except OSError as error:
+        raise UsageError(
+            f"{plan.folder} cannot be written ({error.strerror}). Choose another folder with --out."
+        ) from None
+
+
+def finish(plan: DesignPlan, statuses: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
+    """Return the experiment's object, made from the records, and write it as experiment.json.
+
+    `statuses` has what the board `vision` said of itself at the end of each variant (`board.control.status`).
+    """
+    variants = {variant: _variant(plan, variant, status) for variant, status in statuses.items()}
+    one, two = (variants[variant] for variant in VARIANTS)
+    experiment = {
+        "experiment": "design",
+        "clock": plan.clock,
+        "seconds": plan.seconds,
+        "seed": plan.seed,
+        "profile": plan.profile,
+        "variants": variants,
+        "shared_slot_costs_ms": {
+            chain: _difference(one[f"{chain}_ms"]["median"], two[f"{chain}_ms"]["median"])
+            for chain in ("filter", "control")
+        },
+        "date": datetime.now(UTC).isoformat(timespec="seconds"),
+        "command": shlex.join(["reconros", *sys.argv[1:]]),
+        "machine": f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores",
+        "versions": {
+            "Python": platform.python_version(),
+            **{name: version(name) for name in ("reconros-zenoh", "eclipse-zenoh", "simpy", "numpy")},
+        },
+    }
+    path = plan.folder / "experiment.json"
+    try:
+        path.write_text(json.dumps(experiment, indent=1), encoding="utf-8")
+    except OSError as error:
+        raise UsageError(f"{path} cannot be written ({error.strerror}). Choose another --out.") from None
+    return experiment
+
+
+def all_right(experiment: Mapping[str, Any]) -> bool:
+    """Tell whether both chains gave something under each variant, and nothing wrong.
+
+    Pictures may be lost: they are sent with best effort.
+    """
+    return all(
+        variant["frames_out"] and variant["control_out"] and not variant["wrong"]
+        for variant in experiment["variants"].values()
+    )
+
+
+def _variant(plan: DesignPlan, variant: str, status: Mapping[str, Any]) -> dict[str, Any]:
+    summaries = {}
+    for chain in ("filter", "control"):
+        record = read_record(plan.variant_folder(variant) / f"{chain}.csv")
+        summaries[chain] = summarise(record.values_ms, record.lost, record.wrong, _PERCENTILES)
+    slots = status["slots"]
+    return {
+        "reconfigurations": sum(slot["reconfigurations"] for slot in slots),
+        "reconfiguration_ms": sum(slot["reconfiguration_ms"] for slot in slots),
+        "slots": slots,
+        "frames_in": plan.pictures,
+        "frames_out": summaries["filter"]["n"],
+        "control_out": summaries["control"]["n"],
+        "wrong": sum(int(summary["wrong"] or 0) for summary in summaries.values()),
+        **{
+            f"{chain}_ms": {name: summary[name] for name in _PERCENTILES}
+            for chain, summary in summaries.items()
+        },
+        "spans_ms": status["spans_ms"],
+        "callbacks": status["callbacks"],
+        "host": status["host"],
+    }
+
+
+def _difference(one: float | None, two: float | None) -> float | None:
+    return None if one is None or two is None else one - two
