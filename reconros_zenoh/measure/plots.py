@@ -8,7 +8,6 @@ from __future__ import annotations
 import io
 import re
 import textwrap
-from itertools import cycle
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -36,12 +35,17 @@ _MAPPING_COLOURS = ("#d2691e", "#2f7ec4", "#2a9267", "#9463c0", "#c2485a", "#8a7
 _STAGE_COLOURS = {
     "transport": "#7a8794",
     "dds": "#2f7ec4",
+    "retransmission": "#e58fa8",
     "queue": "#d9a520",
+    "dispatch": "#8a7a1f",
     "reconfiguration": "#c2485a",
     "execution": "#2a9267",
     "memif": "#9463c0",
+    "osif": "#5cb8c4",
+    "blocked": "#c9d1d9",
+    "hmt": "#9fc46b",
     "gateway": "#d2691e",
-    "publish": "#5cb8c4",
+    "overrun": "#24292f",
 }
 _GRID_BINS = 60
 _GRID_PERCENTILES = (1.0, 50.0, 95.0)
@@ -321,9 +325,6 @@ def _legend(figure: Figure, ours: str, behind: str | None) -> None:
 
 
 def _stage_colours(stages: Iterable[str]) -> dict[str, str]:
-    """Return a colour per stage, in the order of a message's way, stages of other names last."""
-    found = dict.fromkeys(stages)
-    known = {stage: colour for stage, colour in _STAGE_COLOURS.items() if stage in found}
-    return known | dict(
-        zip((stage for stage in found if stage not in known), cycle(_MAPPING_COLOURS), strict=False)
-    )
+    """Return a colour per stage, in the order of a message's way."""
+    found = set(stages)
+    return {stage: colour for stage, colour in _STAGE_COLOURS.items() if stage in found}

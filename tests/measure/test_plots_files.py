@@ -2,13 +2,16 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from typing import get_args
 from xml.etree import ElementTree as ET
 
 import numpy as np
 import pytest
 from board_like_runs import like_the_board
 
+from reconros_zenoh.board.spans import Stage
 from reconros_zenoh.errors import UsageError
+from reconros_zenoh.measure import plots
 from reconros_zenoh.measure.histogram import NamedRecord
 from reconros_zenoh.measure.plots import grid_figure, inline_svg, spans_figure, write_grid, write_histograms
 from reconros_zenoh.measure.record import Record
@@ -122,3 +125,8 @@ def test_histograms_are_drawn_with_their_comparison(tmp_path):
 def test_measuring_does_not_load_the_drawing_library():
     code = "import sys, reconros_zenoh.measure.report; sys.exit('matplotlib' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_each_stage_has_a_colour_of_its_own():
+    assert set(plots._STAGE_COLOURS) == set(get_args(Stage))
+    assert len(set(plots._STAGE_COLOURS.values())) == len(plots._STAGE_COLOURS)
