@@ -325,6 +325,8 @@ def _legend(figure: Figure, ours: str, behind: str | None) -> None:
 
 
 def _stage_colours(stages: Iterable[str]) -> dict[str, str]:
-    """Return a colour per stage, in the order of a message's way."""
-    found = set(stages)
-    return {stage: colour for stage, colour in _STAGE_COLOURS.items() if stage in found}
+    """Return a colour per stage, in the order of a message's way; stages of other names are grey and last."""
+    found = dict.fromkeys(stages, GREY)
+    return {stage: colour for stage, colour in _STAGE_COLOURS.items() if stage in found} | {
+        stage: GREY for stage in found if stage not in _STAGE_COLOURS
+    }
