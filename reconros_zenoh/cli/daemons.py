@@ -93,10 +93,11 @@ def client(
     router: Router = ENDPOINT,
     domain: Domain = 0,
     limit: Annotated[
-        float, typer.Option(min=0.001, metavar="SECONDS", help="After this time an answer is lost.")
+        float,
+        typer.Option(min=0.001, max=86400, metavar="SECONDS", help="After this time an answer is lost."),
     ] = 2.0,
     wait: Annotated[
-        float, typer.Option(min=0.1, metavar="SECONDS", help="How long to wait for a board.")
+        float, typer.Option(min=0.1, max=86400, metavar="SECONDS", help="How long to wait for a board.")
     ] = 30.0,
     out: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Record each round trip there.", show_default=False)
