@@ -11,7 +11,7 @@ from reconros_zenoh.board.cpu import Cpu
 from reconros_zenoh.board.dds import DdsStack
 from reconros_zenoh.board.endpoints import TopicWriter
 from reconros_zenoh.board.gateway import Gateway
-from reconros_zenoh.board.hmt import HardwareTopic
+from reconros_zenoh.board.hmt import HardwareTopic, hmt_key
 from reconros_zenoh.board.host import IN_LINE_NS, Host
 from reconros_zenoh.board.local_topics import LocalTopics, LocalTopicWriter
 from reconros_zenoh.board.memif import Memif
@@ -139,12 +139,13 @@ class Board:
 
         Raise UsageError when one of them has a gateway already, or another type.
         """
-        topic = self.hardware_topic(hmt, message_type)
-        taken = conflict(Pair(topic.key, smt), [gateway.pair for gateway in self.gateways])
+        pair = Pair(hmt_key(self.name, hmt), smt)
+        taken = conflict(pair, [gateway.pair for gateway in self.gateways])
         if taken is not None:
             raise UsageError(
                 f"{taken} has a gateway on board {self.name!r} already: two would send messages round."
             )
+        topic = self.hardware_topic(hmt, message_type)
         gateway = Gateway(self, self.context.node(name), topic, smt)
         self.gateways.append(gateway)
         return gateway

@@ -188,7 +188,7 @@ class Executor:
         self._registrations[dispatch.entry.name].source.answer(event, response)
         self._finish(dispatch)
 
-    def fail(self, dispatch: Dispatch, event: Event, error: Exception) -> None:
+    def fail(self, dispatch: Dispatch, event: Event, error: BaseException) -> None:
         """Note that the callback raised: it is logged and counted, and the sender of a request is told."""
         name = dispatch.entry.name
         self.failures[name] += 1

@@ -5,11 +5,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import msgpack
+from pydantic import BaseModel, ConfigDict, ValidationError
 
 from reconros_zenoh.board.control import VERSION, ask, gateways
 from reconros_zenoh.errors import UsageError
 from reconros_zenoh.ros.graph import EndpointToken, parse, tokens_expression
-from reconros_zenoh.ros.names import dds_type_name
+from reconros_zenoh.ros.names import dds_type_name, resolve
 
 if TYPE_CHECKING:
     from reconros_zenoh.board.board import Board
@@ -17,6 +18,26 @@ if TYPE_CHECKING:
     from reconros_zenoh.transport.base import Request, Transport
 
 _LOOK_NS = 1_000_000_000
+
+
+class _Wanted(BaseModel):
+    """A gateway to be added."""
+
+    model_config = ConfigDict(strict=True)
+
+    name: str
+    hmt: str
+    smt: str
+    type: str
+
+
+class _Question(BaseModel):
+    """What a board is asked; anybody in the network can ask anything."""
+
+    model_config = ConfigDict(strict=True)
+
+    version: int
+    add: _Wanted | None = None
 
 
 class GatewayServer:
@@ -41,19 +62,21 @@ class GatewayServer:
             self._add(request.read())
         except UsageError as error:
             refused = str(error)
-        except (ValueError, KeyError, TypeError) as error:
+        except ValidationError as error:
+            refused = f"no request: {error.errors()[0]['msg']}"
+        except ValueError as error:
             refused = f"no request: {error!r}"
         answer = {"version": VERSION, "gateways": gateways(self._board), "refused": refused}
         request.reply((msgpack.packb(answer),), None)
 
     def _add(self, payload: memoryview) -> None:
-        question = msgpack.unpackb(payload)
-        if question["version"] != VERSION:
+        question = _Question.model_validate(msgpack.unpackb(payload))
+        if question.version != VERSION:
             raise UsageError(f"board {self._board.name!r} speaks version {VERSION} of the gateway.")
-        wanted = question.get("add")
+        wanted = question.add
         if wanted is not None:
-            message_type = self._types.message(wanted["type"])
-            self._board.add_gateway(wanted["name"], wanted["hmt"], wanted["smt"], message_type)
+            hmt, smt = (resolve(topic, "/", wanted.name) for topic in (wanted.hmt, wanted.smt))
+            self._board.add_gateway(wanted.name, hmt, smt, self._types.message(wanted.type))
 
 
 def ask_gateways(transport: Transport, board: str, add: dict[str, str] | None = None) -> list[dict[str, Any]]:

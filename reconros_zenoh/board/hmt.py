@@ -33,6 +33,11 @@ FIFO_DEPTH = 2
 _BACKLOG = 1_000_000
 
 
+def hmt_key(board: str, topic: str) -> str:
+    """Return the key of a board's hardware-mapped topic of that absolute name."""
+    return f"hmt/{board}/{topic.strip('/')}"
+
+
 @dataclass(frozen=True, slots=True)
 class FifoPlan:
     """The FIFO of one subscriber: how many messages it holds, and what happens when it is full.
@@ -143,7 +148,7 @@ class HardwareTopic:
                 "section [model.hmt] to a copy of the profile, or use the profile zcu104 or native."
             )
         section = model.hmt if model else None
-        self.key = f"hmt/{board.name}/{topic.strip('/')}"
+        self.key = hmt_key(board.name, topic)
         self.type = message_type
         self._board = board
         self._overhead_ns = section.overhead.ns if section else 0

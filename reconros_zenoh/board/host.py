@@ -116,7 +116,7 @@ class Host:
         def run() -> None:
             try:
                 future.set_result(function(*arguments))
-            except Exception as error:  # noqa: BLE001 - handed to whoever asks for the result
+            except (Exception, SystemExit) as error:  # noqa: BLE001 - handed to whoever asks for the result
                 future.set_exception(error)
 
         threading.Thread(target=run, name="limited computation", daemon=True).start()

@@ -6,7 +6,7 @@ import logging
 from collections import deque
 from typing import TYPE_CHECKING, Generic, TypeVar
 
-from reconros_zenoh.clock.activity import Activity
+from reconros_zenoh.clock.activity import PARK, Activity
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator
@@ -39,7 +39,7 @@ class Stream(Generic[T]):
         self._waiting.append(item)
         self._activity.resume()
 
-    def _run(self) -> Generator[Awaitable | None, object, None]:
+    def _run(self) -> Generator[Awaitable, object, None]:
         while True:
             while self._waiting:
                 try:
@@ -47,4 +47,4 @@ class Stream(Generic[T]):
                 except Exception:  # noqa: BLE001 - one message must not end the stream
                     self.dropped += 1
                     _log.exception("a message was lost on its way through the board")
-            yield None
+            yield PARK

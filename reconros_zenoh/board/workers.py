@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, cast
 from reconros_zenoh.board.callback import HardwareThread, ThreadExit
 from reconros_zenoh.board.host import measured
 from reconros_zenoh.board.software import SoftwareContext
-from reconros_zenoh.clock.activity import Activity, Signal, limited
+from reconros_zenoh.clock.activity import PARK, Activity, Signal, limited
 from reconros_zenoh.executor.resource_mask import SOFTWARE
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ class Worker(ABC):
         """Say that a callback which this worker may run has become ready."""
         self._activity.resume()
 
-    def _run(self) -> Generator[Awaitable | None, object, None]:
+    def _run(self) -> Generator[Awaitable, object, None]:
         while True:
             dispatch = self._executor.select(self, self.resource)
             if dispatch is None:
@@ -54,13 +54,13 @@ class Worker(ABC):
             try:
                 response = yield from self._execute(dispatch, event)
                 self._executor.complete(dispatch, event, response)
-            except Exception as error:  # noqa: BLE001 - a callback may raise or return anything; the board goes on
+            except (Exception, SystemExit) as error:  # noqa: BLE001 - a callback may raise or return anything
                 self._executor.fail(dispatch, event, error)
 
-    def _wait(self) -> Generator[Awaitable | None, object, Dispatch]:
+    def _wait(self) -> Generator[Awaitable, object, Dispatch]:
         idle_since_ns = self._environment.now
         while True:
-            yield None
+            yield PARK
             delay_ns = self._executor.until_poll_ns(self._poll_ns, self._environment.now - idle_since_ns)
             if delay_ns:
                 yield self._environment.timeout(delay_ns)

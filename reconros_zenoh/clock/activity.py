@@ -36,23 +36,34 @@ class Signal:
 Awaitable: TypeAlias = "simpy.Event | Signal"
 """What a process may yield to wait for it."""
 
+PARK = Signal()
+"""What an activity yields to wait until it is resumed."""
+
 
 def limited(
     steps: Generator[Awaitable, Any, R], deadline: Signal, error: Callable[[], Exception]
 ) -> Generator[Awaitable, Any, R]:
     """Return what the steps return; when the deadline happens before they end, raise the error in them.
 
-    Steps that never wait cannot be stopped.
+    They may wait once more to put things in order; then they are closed. Steps that never wait cannot be
+    stopped.
     """
+    failure: Exception | None = None
+    in_order = False
     try:
         waited_for = next(steps)
         while True:
             if waited_for.callbacks is not None and deadline.callbacks is not None:
                 yield _first(waited_for, deadline)
-                if deadline.callbacks is None and waited_for.callbacks is not None:
-                    waited_for = steps.throw(error())
+            if waited_for.callbacks is not None:
+                if failure is None:
+                    failure = error()
+                    waited_for = steps.throw(failure)
                     continue
-            elif waited_for.callbacks is not None:
+                if in_order:
+                    steps.close()
+                    raise failure
+                in_order = True
                 yield waited_for
             if waited_for.ok:
                 waited_for = steps.send(waited_for.value)
@@ -80,13 +91,14 @@ def _first(event: Awaitable, deadline: Signal) -> Signal:
 class Activity:
     """Drives a generator like `simpy.Process`, from the moment it is made.
 
-    The generator yields events and signals to wait for, or None to park until `resume`. A `simpy.Process`
-    needs an event to begin and another to be woken; in wall time those are most of what a message costs.
+    The generator yields events and signals to wait for, or PARK until `resume`; anything else raises
+    TypeError in it. A `simpy.Process` needs an event to begin and another to be woken; in wall time those are most of
+    what a message costs.
     """
 
     __slots__ = ("_generator", "parked")
 
-    def __init__(self, generator: Generator[Awaitable | None, Any, object]) -> None:
+    def __init__(self, generator: Generator[Awaitable, Any, object]) -> None:
         self._generator = generator
         self.parked = True
         self.resume()
@@ -110,10 +122,25 @@ class Activity:
                     waited_for = self._generator.throw(cast("BaseException", event.value))
             except StopIteration:
                 return
-            if waited_for is None:
+            if waited_for is PARK:
                 self.parked = True
                 return
-            if waited_for.callbacks is not None:
-                waited_for.callbacks.append(self._advance)
+            try:
+                callbacks = waited_for.callbacks
+            except AttributeError:
+                event = _Refused(waited_for)
+                continue
+            if callbacks is not None:
+                callbacks.append(self._advance)
                 return
             event = waited_for
+
+
+class _Refused:
+    """Stands for what was yielded and cannot be waited for."""
+
+    ok = False
+    callbacks = None
+
+    def __init__(self, yielded: object) -> None:
+        self.value = TypeError(f"{yielded!r} cannot be waited for. Call what takes time with `yield from`.")

@@ -152,3 +152,21 @@ def test_a_limit_that_cannot_be(limit_ms: float) -> None:
     board = small_board(PROFILE)
     with pytest.raises(UsageError, match=r"limit_ms=.* of callback 'a': write a time above 0"):
         Executor(board, 1, 0).add_sw_callback("a", SUB, Tickets(board), lambda _, __: 0, limit_ms=limit_ms)
+
+
+def test_steps_that_catch_everything_are_stopped() -> None:
+    def stubborn(thread: HardwareThread) -> Steps:
+        while True:
+            try:
+                yield from thread.compute_cycles(10)
+            except Exception:  # noqa: BLE001, S112 - what is tested
+                continue
+
+    board = small_board(PROFILE, 1)
+    executor, source = Executor(board, 0, 1), Tickets(board)
+    executor.add_hw_callback("a", [0], SUB, source, stubborn, timing=Cycles(0), limit_ms=0.001)
+    executor.spin()
+    source.put(1)
+    board.environment.run(until=100_000)
+    assert executor.failures == {"a": 1}
+    assert board.slots[0].busy_ns == 1010

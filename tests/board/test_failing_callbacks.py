@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import sys
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -14,6 +15,8 @@ from reconros_zenoh.errors import TransportError
 from reconros_zenoh.executor.callbacks import CallbackKind
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from small_board import Steps
 
     from reconros_zenoh.board.board import Board
@@ -214,3 +217,41 @@ def test_a_service_callback_that_returns_no_response_has_failed(
     assert len(caplog.records) == 1
     assert service.executor.failures == {"a": 1}
     assert service.call(returns=service.yes()) == service.yes()
+
+
+@pytest.mark.parametrize("end", [lambda: sys.exit(3), lambda: iter(()).__next__()])
+@pytest.mark.parametrize("limit_ms", [None, 1000.0])
+def test_a_callback_in_software_that_wants_to_end_the_board(
+    end: Callable[[], object], limit_ms: float | None, caplog: pytest.LogCaptureFixture
+) -> None:
+    board = small_board(PROFILE)
+    executor, source = Executor(board, 1, 0), Tickets(board)
+    executor.add_sw_callback("a", CallbackKind.SUB, source, lambda _, __: end(), limit_ms=limit_ms)
+    executor.spin()
+    source.put(1)
+    source.put(2)
+    board.environment.run(until=1000)
+    assert executor.failures == {"a": 2}
+
+
+def test_hardware_callbacks_that_are_not_written_as_they_must_be(caplog: pytest.LogCaptureFixture) -> None:
+    def leaves(_: HardwareThread) -> Steps:
+        sys.exit(3)
+        yield
+
+    def forgets_from(thread: HardwareThread) -> Any:
+        yield thread.get_init_data()
+
+    def waits_for_nothing(_: HardwareThread) -> Any:
+        yield
+
+    callbacks = [leaves, forgets_from, waits_for_nothing, lambda _: 5, lambda _: None]
+    for callback in callbacks:
+        board = small_board(PROFILE, 1)
+        executor, source = Executor(board, 0, 1), Tickets(board)
+        executor.add_hw_callback("a", [0], CallbackKind.SUB, source, callback)
+        executor.spin()
+        source.put(1)
+        source.put(2)
+        board.environment.run(until=100_000)
+        assert executor.failures == {"a": 2}, callback

@@ -173,8 +173,9 @@ def test_a_second_gateway_on_a_topic_is_refused_and_so_is_another_type() -> None
     for hmt, smt, taken in (("/a", "/b", "hmt/board0/a"), ("/b", "/a", "/a")):
         with pytest.raises(UsageError, match=f"^{taken} has a gateway on board 'board0' already"):
             side.board.add_gateway("second", hmt, smt, words)
+    side.board.hardware_topic("/c", words)
     with pytest.raises(UsageError, match="has the type std_msgs/msg/UInt8MultiArray"):
-        side.board.add_gateway("second", "/a", "/b", types().message("std_msgs/msg/UInt32"))
+        side.board.add_gateway("second", "/c", "/c", types().message("std_msgs/msg/UInt32"))
     side.publish_in_software(message(1))
     side.environment.run()
     assert side.numbers() == [[1], [1], [1]]

@@ -18,6 +18,7 @@ ADD = {"name": "bridge", "hmt": "/a", "smt": "/a", "type": "std_msgs/msg/UInt32"
 class Running:
     def __init__(self) -> None:
         self.board = small_board(small_profile(topics={}))
+        self.board.hardware_topic("/c", types().message("std_msgs/msg/UInt32"))
         self.server = GatewayServer(self.board, types())
         self.client = desktop(self.board)
         self.querier = self.client.transport.request(f"reconros/{self.board.name}/gateway")
@@ -32,7 +33,7 @@ class Running:
         return reply and msgpack.unpackb(reply.payload)
 
 
-def request(**add: str) -> bytes:
+def request(**add: object) -> bytes:
     packed: bytes = msgpack.packb({"version": VERSION, **({"add": add} if add else {})})
     return packed
 
@@ -54,9 +55,18 @@ def test_a_gateway_is_added_and_listed() -> None:
             request(**{**ADD, "hmt": "/b", "smt": "/b", "type": "std_msgs/msg/Nothing"}),
             "std_msgs/msg/Nothing",
         ),
-        (request(**{**ADD, "hmt": "/a", "smt": "/b", "type": "std_msgs/msg/String"}), "has the type"),
+        (request(**{**ADD, "hmt": "/c", "smt": "/c", "type": "std_msgs/msg/String"}), "has the type"),
         (msgpack.packb({"version": VERSION + 1}), f"speaks version {VERSION}"),
-        (request(name="x"), "no request: KeyError"),
+        (request(**{**ADD, "hmt": "/b"}), "/a has a gateway on board 'board0' already"),
+        (request(**{**ADD, "hmt": "/b*", "smt": "/b"}), "'/b*' contains '*'"),
+        (request(**{**ADD, "hmt": "/b", "smt": "b c"}), "'b c' contains ' '"),
+        (request(**{**ADD, "hmt": "/b", "smt": "/b", "name": "a b"}), "The node name 'a b'"),
+        (request(name="x"), "no request: Field required"),
+        *(
+            (request(**{**ADD, "hmt": "/b", "smt": "/b", key: 5}), "no request: Input should be a valid str")
+            for key in ADD
+        ),
+        (msgpack.packb({"version": VERSION, "add": 5}), "no request"),
         (msgpack.packb(5), "no request"),
         (b"\xc1", "no request"),
     ],
@@ -64,8 +74,10 @@ def test_a_gateway_is_added_and_listed() -> None:
 def test_what_cannot_be_added_is_refused_and_changes_nothing(question: bytes, words: str) -> None:
     running = Running()
     before = running.ask(request(**ADD))
+    topics = list(running.board.hardware_topics)
     assert words in running.ask(question)["refused"]
     assert running.ask(request()) == before
+    assert list(running.board.hardware_topics) == topics
 
 
 def test_a_closed_server_does_not_answer() -> None:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from reconros_zenoh.clock.activity import Activity, Signal, limited
+from reconros_zenoh.clock.activity import PARK, Activity, Signal, limited
 from reconros_zenoh.clock.virtual import VirtualEnvironment
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ def test_an_activity_begins_when_it_is_made_and_goes_on_when_it_is_resumed_both_
     def work() -> Generator[simpy.Event | None, object, None]:
         for name in "abc":
             log.append(name)
-            yield None
+            yield PARK
 
     activity = Activity(work())
     assert log == ["a"]
@@ -102,7 +102,7 @@ def test_an_event_that_fails_raises_in_the_activity_which_may_go_on(late: bool) 
 
 def test_what_an_activity_raises_reaches_who_made_it_go_on() -> None:
     def work() -> Generator[simpy.Event | None, object, None]:
-        yield None
+        yield PARK
         raise ValueError("reason")
 
     activity = Activity(work())
@@ -114,7 +114,7 @@ def test_who_waits_for_a_signal_goes_on_while_it_is_fired_in_the_order_of_waitin
     signal = Signal()
     log: list[object] = []
 
-    def work(name: str) -> Generator[Awaitable | None, object, None]:
+    def work(name: str) -> Generator[Awaitable, object, None]:
         log.append((name, (yield signal)))
 
     first, _ = Activity(work("first")), Activity(work("second"))
@@ -128,7 +128,7 @@ def test_a_signal_happens_once_and_is_not_waited_for_any_more() -> None:
     signal = Signal()
     log: list[str] = []
 
-    def work() -> Generator[Awaitable | None, object, None]:
+    def work() -> Generator[Awaitable, object, None]:
         yield signal
         log.append("first")
         yield signal
@@ -215,3 +215,17 @@ def test_stopped_steps_may_wait_once_more_before_they_end() -> None:
     Activity(run())
     environment.run(until=100)
     assert ended == [17, 17]
+
+
+@pytest.mark.parametrize("junk", [None, 5, "word"])
+def test_what_cannot_be_waited_for_is_raised_where_it_was_yielded(junk: Any) -> None:
+    said = []
+
+    def work() -> Generator[Awaitable, object, None]:
+        try:
+            yield junk
+        except TypeError as error:
+            said.append(str(error))
+
+    Activity(work())
+    assert said == [f"{junk!r} cannot be waited for. Call what takes time with `yield from`."]

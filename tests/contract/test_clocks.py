@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import pytest
 import simpy
 
-from reconros_zenoh.clock.activity import Activity
+from reconros_zenoh.clock.activity import PARK, Activity
 from reconros_zenoh.clock.virtual import VirtualEnvironment, succeed_once
 from reconros_zenoh.clock.wall import WallEnvironment
 
@@ -86,7 +86,7 @@ class Scenario:
 
     def _count(self) -> Generator[simpy.Event | None, object, None]:
         for number in (1, 2, 3, 4):
-            yield None
+            yield PARK
             self._note(f"{number} done")
         yield self._environment.timeout(100 * US)
         self._note("the end")
