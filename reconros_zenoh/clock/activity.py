@@ -92,8 +92,8 @@ class Activity:
     """Drives a generator like `simpy.Process`, from the moment it is made.
 
     The generator yields events and signals to wait for, or PARK until `resume`; anything else raises
-    TypeError in it. A `simpy.Process` needs an event to begin and another to be woken; in wall time those are most of
-    what a message costs.
+    TypeError in it. A `simpy.Process` needs an event to begin and another to be woken; in wall time those are
+    most of what a message costs.
     """
 
     __slots__ = ("_generator", "parked")
