@@ -14,7 +14,7 @@ from rich.console import Console
 from board_daemon.hosting import BoardOptions
 from reconros_zenoh.board.control import status
 from reconros_zenoh.board.profile import profile_names, read_profile
-from reconros_zenoh.cli.options import ENDPOINT, AsJson, ClockName, Domain, Router
+from reconros_zenoh.cli.options import ENDPOINT, AsJson, ClockName, Domain, Router, project_prints
 from reconros_zenoh.cli.status_screen import print_status
 from reconros_zenoh.errors import UsageError
 from reconros_zenoh.project.loader import load_project
@@ -68,23 +68,25 @@ def run(
     """Host a project on an emulated board of its TargetBoard, and show at the end what the board has done."""
     if seconds is not None and not math.isfinite(seconds):
         raise UsageError(f"--seconds {seconds}: give a number.")
-    loaded = load_project(project)
-    model = read_profile(profile or _profile_of(loaded.configuration))
-    mapped = loaded.mapping(mapping)
-    options = BoardOptions(name, domain, seed, bitstreams)
-    if clock is ClockName.VIRTUAL:
-        done = _run_virtual(model, loaded, mapped, options, seconds or _VIRTUAL_S)
-    else:
-        from board_daemon.daemon import run_board
+    with project_prints(as_json=as_json):
+        loaded = load_project(project)
+        model = read_profile(profile or _profile_of(loaded.configuration))
+        mapped = loaded.mapping(mapping)
+        options = BoardOptions(name, domain, seed, bitstreams)
+        if clock is ClockName.VIRTUAL:
+            done = _run_virtual(model, loaded, mapped, options, seconds or _VIRTUAL_S)
+        else:
+            from board_daemon.daemon import run_board
 
-        def on_ready() -> None:
-            if not as_json:
-                print(
-                    f"board {name} serves {loaded.configuration.name} under {mapped.name} on {model.name}",
-                    flush=True,
-                )
+            def on_ready() -> None:
+                if not as_json:
+                    print(
+                        f"board {name} serves {loaded.configuration.name} under {mapped.name} "
+                        f"on {model.name}",
+                        flush=True,
+                    )
 
-        done = run_board(router, model, loaded, mapped, options, on_ready, seconds)
+            done = run_board(router, model, loaded, mapped, options, on_ready, seconds)
     if as_json:
         print(json.dumps(done))
     else:

@@ -92,8 +92,8 @@ class Activity:
     """Drives a generator like `simpy.Process`, from the moment it is made.
 
     The generator yields events and signals to wait for, or PARK until `resume`; anything else raises
-    TypeError in it. A `simpy.Process` needs an event to begin and another to be woken; in wall time those are most of
-    what a message costs.
+    TypeError in it. A `simpy.Process` needs an event to begin and another to be woken; in wall time those are
+    most of what a message costs.
     """
 
     __slots__ = ("_generator", "parked")
@@ -109,7 +109,7 @@ class Activity:
             self.parked = False
             self._advance(None)
 
-    def _advance(self, event: Awaitable | None) -> None:
+    def _advance(self, event: Awaitable | _Refused | None) -> None:
         """Run the generator until it parks, ends, or waits for something that has not happened."""
         while True:
             try:

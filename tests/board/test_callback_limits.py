@@ -159,7 +159,7 @@ def test_steps_that_catch_everything_are_stopped() -> None:
         while True:
             try:
                 yield from thread.compute_cycles(10)
-            except Exception:  # noqa: BLE001, S112 - what is tested
+            except Exception:  # noqa: BLE001 - what is tested
                 continue
 
     board = small_board(PROFILE, 1)
