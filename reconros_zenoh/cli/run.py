@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import logging
 import math
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -107,10 +108,11 @@ def _profile_of(configuration: BuildConfiguration) -> str:
 def _run_virtual(
     profile: Profile, project: Project, mapping: Mapping, options: BoardOptions, seconds: float
 ) -> dict[str, Any]:
-    """Return the status of the board after so many seconds of virtual time."""
+    """Return the status of the board after so many seconds of virtual time, or at Ctrl-C."""
     from reconros_zenoh.experiments.simulation import Simulation
 
     with Simulation(project.types()) as simulation:
         hosted = simulation.add_board(profile, project, mapping, options)
-        simulation.environment.run(until=round(seconds * 1e9))
+        with suppress(KeyboardInterrupt):
+            simulation.environment.run(until=round(seconds * 1e9))
         return status(hosted.board, hosted.executor)
