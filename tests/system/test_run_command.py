@@ -40,9 +40,7 @@ def test_what_a_project_publishes_is_heard_until_ctrl_c(network: Network, tmp_pa
         assert second.count == first.count + 1
         board.wait_for("serves blink under hardware on native")
         assert board.end(signal.SIGINT) == 0
-        assert any(
-            line.split()[:3] == ["0", "count", "1"] for line in board.out
-        )  # slot, holds, reconfigurations
+        assert any(line.split()[:3] == ["0", "count", "1"] for line in board.out)
     node.close()
 
 
