@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from reconros_zenoh.board.board import Board
 from reconros_zenoh.clock.wall import WallEnvironment
+from reconros_zenoh.errors import UsageError
 from reconros_zenoh.project.application import Application
 from reconros_zenoh.rmw.node import Context
 
@@ -21,15 +23,24 @@ if TYPE_CHECKING:
     from reconros_zenoh.transport.base import Transport
 
 
+_NAME = re.compile(r"[A-Za-z0-9_.-]+")  # one part of a key
+
+
 @dataclass(frozen=True, slots=True)
 class BoardOptions:
-    """What distinguishes one hosted board from another."""
+    """What distinguishes one hosted board from another; UsageError for a name that cannot stand in a key."""
 
     name: str = "board0"
     domain: int = 0
     seed: int = 0
     bitstreams: Path | None = None
     tap: bool = False
+
+    def __post_init__(self) -> None:
+        if not _NAME.fullmatch(self.name):
+            raise UsageError(
+                f"{self.name!r} cannot name a board. Use letters, digits, `-`, `_` and `.` (--name)."
+            )
 
 
 class HostedBoard:

@@ -110,6 +110,7 @@ class Executor:
         """
         if isinstance(source, HmtSource):
             raise UsageError(f"callback {name!r} reads a hardware-mapped topic: it cannot run in software.")
+        _check_function(name, function)
         if not self._software_workers:
             raise UsageError(f"callback {name!r} runs in software, but there are no software workers.")
         time = software_time(self.board.profile, name, timing)
@@ -129,6 +130,7 @@ class Executor:
         limit_ms: float | None = None,
     ) -> None:
         """Let the callback `name` run in these slots; the rest is as in `add_sw_callback`."""
+        _check_function(name, thread)
         served = {slot.slot_id for slot in self._slots}
         for slot in slots:
             if slot not in served:
@@ -245,6 +247,11 @@ class Executor:
     def _wake(self, entry: CallbackEntry) -> None:
         for worker in self._workers_of[entry.name]:
             worker.wake()
+
+
+def _check_function(callback: str, function: object) -> None:
+    if not callable(function):
+        raise UsageError(f"callback {callback!r} is {function!r}, which cannot be called. Give a function.")
 
 
 def _limit(callback: str, limit_ms: float | None) -> Limit | None:

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import logging
 from typing import TYPE_CHECKING
 
 from reconros_zenoh.board.endpoints import SubscriptionSource
 from reconros_zenoh.board.hmt import Fifo, FifoPlan
 from reconros_zenoh.clock.activity import Activity, Signal
-from reconros_zenoh.errors import UsageError
+from reconros_zenoh.errors import BadMessageError, UsageError
 from reconros_zenoh.gateway import core
 from reconros_zenoh.gateway.filters import Pair, PublisherFilter
 
@@ -20,8 +19,6 @@ if TYPE_CHECKING:
     from reconros_zenoh.board.hmt import HardwareTopic
     from reconros_zenoh.clock.activity import Awaitable
     from reconros_zenoh.rmw.node import Node
-
-_log = logging.getLogger(__name__)
 
 
 class Gateway:
@@ -124,9 +121,9 @@ class Gateway:
         try:
             yield from self._topic.publish(self, event.message, event.size, event.timeline)
             self.to_hmt += 1
-        except UsageError as error:
+        except BadMessageError as error:
             self.refused += 1
-            _log.warning("gateway %s: %s", self.name, error)
+            self._board.context.rejections.add(self._topic.key, None, error)
         if read.callbacks is not None:
             yield read
 

@@ -188,13 +188,14 @@ class HardwareTopic:
     ) -> Generator[Awaitable, object, None]:
         """Return when the message of `size` bytes on the wire has passed.
 
-        Raise UsageError when it is larger than somebody's FIFO.
+        Raise BadMessageError when it is larger than somebody's FIFO.
         """
         for fifo in self._fifos:
             if fifo.plan.message_bytes is not None and size > fifo.plan.message_bytes:
-                raise UsageError(
+                raise BadMessageError(
+                    "fifo_size",
                     f"a message of {size} bytes on {self.key} does not fit a FIFO that is declared for "
-                    f"{fifo.plan.message_bytes}. Raise the bytes in build.cfg."
+                    f"{fifo.plan.message_bytes}. Raise the bytes in build.cfg.",
                 )
         fifos = [fifo for fifo in self._fifos if fifo.own is None or fifo.own.passes(publisher)]
         self.waits += any(fifo.blocks for fifo in fifos)

@@ -5,13 +5,14 @@ from __future__ import annotations
 import threading
 import time
 from collections import OrderedDict
-from concurrent.futures import Future, ThreadPoolExecutor, wait
+from concurrent.futures import Future, wait
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Generic, TypeVar, cast
 
 import numpy as np
 import xxhash
 
+from reconros_zenoh.board.thread_pool import ThreadPool
 from reconros_zenoh.errors import CallbackLimitError
 
 if TYPE_CHECKING:
@@ -82,7 +83,7 @@ class Host:
         """
         self._environment = environment
         self._in_line_ns = in_line_ns
-        self._pool = None if threads is None else ThreadPoolExecutor(threads, "computation")
+        self._pool = None if threads is None else ThreadPool(threads, "computation")
         self._expected_ns: dict[object, float] = {}
         self._results: OrderedDict[object, object] = OrderedDict()
         self.overruns = Overruns()
@@ -167,9 +168,9 @@ class Host:
         return result
 
     def close(self) -> None:
-        """Let running computations end and start no other."""
+        """Start no other computation, and wait for a while for those that run."""
         if self._pool is not None:
-            self._pool.shutdown(wait=True, cancel_futures=True)
+            self._pool.close()
 
     def _timed(self, task: object, function: Callable[..., R], *arguments: object) -> R:
         started_ns = time.perf_counter_ns()

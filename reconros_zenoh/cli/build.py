@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from reconros_zenoh.board.profile import read_profile
+from reconros_zenoh.cli.options import project_prints
 from reconros_zenoh.project.loader import load_project
 
 
@@ -24,7 +25,9 @@ def build(
 ) -> None:
     """Write a partial bitstream for each callback and each slot it can be built for."""
     folder = out or project / "bitstreams"
-    bitstreams = load_project(project).bitstreams(read_profile(profile))
+    with project_prints(as_json=as_json):
+        loaded = load_project(project)
+    bitstreams = loaded.bitstreams(read_profile(profile))
     written = [bitstream.write(folder) for bitstream in bitstreams]
     if as_json:
         print(

@@ -14,6 +14,7 @@ from rich.table import Table
 from rich.text import Text
 
 from reconros_zenoh.project.build_cfg import read_build_cfg
+from reconros_zenoh.project.communication import check_topics
 from reconros_zenoh.project.interfaces import read_interfaces
 from reconros_zenoh.project.resources import slot_resources
 
@@ -48,6 +49,7 @@ def check(
     """
     path = project / "build.cfg" if project.is_dir() else project
     configuration = read_build_cfg(path)
+    check_topics(configuration)
     if project.is_dir():
         read_interfaces(project).registry()
     if as_json:

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
     from reconros_zenoh.experiments.roundtrip import Clock
 
+_RESULT = "gateway.json"
 _FIGURES = {"hardware": "fig6_hardware_publisher.png", "software": "fig7_software_publisher.png"}
 
 
@@ -62,6 +63,7 @@ def gateway(
         if clock is ClockName.VIRTUAL or publisher is PublisherName.HARDWARE:
             raise UsageError("profile native runs in real time, with the publisher in software.")
         publishers = ["software"]
+    _prepare(out)
     with run_bar("cells", len(publishers) * len(byte_counts) * len(counts), quiet=as_json) as advance:
         if board.model is None:
             result = measure_native(byte_counts, counts, repeat, advance)
@@ -70,16 +72,30 @@ def gateway(
     paths = _write(out, result)
     if as_json:
         print(json.dumps(result))
-        return
-    _print(Console(), result)
-    print(f"drawings and gateway.json: {', '.join(map(str, paths))}")
+    else:
+        _print(Console(), result)
+        print(f"drawings and gateway.json: {', '.join(map(str, paths))}")
+    if result["interrupted"]:
+        raise typer.Exit(130)
+
+
+def _prepare(out: Path) -> None:
+    """Make the folder before anything is measured, without what an earlier run left."""
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        for name in (_RESULT, *_FIGURES.values()):
+            (out / name).unlink(missing_ok=True)
+        (out / _RESULT).touch()  # who cannot write shall hear of it before he measures
+    except OSError as error:
+        raise UsageError(
+            f"{out} cannot be written ({error.strerror}). Choose another folder with --out."
+        ) from None
 
 
 def _write(out: Path, result: dict[str, Any]) -> list[Path]:
     from reconros_zenoh.measure.gateway_plots import transmission_figure
 
-    out.mkdir(parents=True, exist_ok=True)
-    (out / "gateway.json").write_text(json.dumps(result, indent=2) + "\n")
+    (out / _RESULT).write_text(json.dumps(result, indent=2) + "\n", encoding="utf-8")
     paths = []
     for publisher in dict.fromkeys(cell["publisher"] for cell in result["cells"]):
         paths.append(out / _FIGURES[publisher])
@@ -112,6 +128,8 @@ def _print(console: Console, result: dict[str, Any]) -> None:
     lost = sum(cell[variant]["lost"] for cell in result["cells"] for variant in ("smt", "gateway"))
     if lost:
         console.print(f"{lost} messages were lost to somebody and are not in the times")
+    if result["interrupted"]:
+        console.print(f"interrupted after {len(result['cells'])} cells")
     for line in result.get("copies", ()):
         console.print(line)
 

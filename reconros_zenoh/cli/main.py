@@ -89,4 +89,4 @@ def _fail(error: ReconrosError, status: int) -> None:
 
 def _end(*_: object) -> None:
     """End on SIGTERM as on Ctrl-C: through every `finally`."""
-    sys.exit(130)
+    raise KeyboardInterrupt

@@ -15,7 +15,7 @@ from rich.table import Table
 from rich.text import Text
 
 from reconros_zenoh.board.profile import read_profile
-from reconros_zenoh.cli.options import ENDPOINT, AsJson, Domain, Router
+from reconros_zenoh.cli.options import ENDPOINT, AsJson, Domain, Router, project_prints
 from reconros_zenoh.errors import UsageError
 from reconros_zenoh.mapping.communication import Crossings, map_topics
 from reconros_zenoh.mapping.graph_file import read_graph_file
@@ -86,7 +86,8 @@ def map_communication(
     """
     if hardware and not live:
         raise UsageError("--hardware names nodes of --live; projects and graph files say it themselves.")
-    read = _read_live(router, domain, hardware or [], source) if live else _read(source, mapping)
+    with project_prints(as_json=as_json):
+        read = _read_live(router, domain, hardware or [], source) if live else _read(source, mapping)
     if read.configuration is None and (mapping is not None or apply):
         raise UsageError(f"{'--apply' if apply else '--mapping'} needs the folder of a project.")
     graph = read.graph

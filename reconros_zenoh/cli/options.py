@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import sys
+from contextlib import contextmanager, redirect_stdout
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
 
 
 class ClockName(StrEnum):
@@ -27,3 +32,10 @@ Router = Annotated[
 ]
 Domain = Annotated[int, typer.Option(min=0, max=232, envvar="ROS_DOMAIN_ID", help="The ROS domain.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
+
+
+@contextmanager
+def project_prints(*, as_json: bool) -> Iterator[None]:
+    """Let what a project prints while the block runs go to stderr, where stdout is for one JSON object."""
+    with redirect_stdout(sys.stderr if as_json else sys.stdout):
+        yield

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import logging
 import math
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -14,7 +15,7 @@ from rich.console import Console
 from board_daemon.hosting import BoardOptions
 from reconros_zenoh.board.control import status
 from reconros_zenoh.board.profile import profile_names, read_profile
-from reconros_zenoh.cli.options import ENDPOINT, AsJson, ClockName, Domain, Router
+from reconros_zenoh.cli.options import ENDPOINT, AsJson, ClockName, Domain, Router, project_prints
 from reconros_zenoh.cli.status_screen import print_status
 from reconros_zenoh.errors import UsageError
 from reconros_zenoh.project.loader import load_project
@@ -68,23 +69,25 @@ def run(
     """Host a project on an emulated board of its TargetBoard, and show at the end what the board has done."""
     if seconds is not None and not math.isfinite(seconds):
         raise UsageError(f"--seconds {seconds}: give a number.")
-    loaded = load_project(project)
-    model = read_profile(profile or _profile_of(loaded.configuration))
-    mapped = loaded.mapping(mapping)
-    options = BoardOptions(name, domain, seed, bitstreams)
-    if clock is ClockName.VIRTUAL:
-        done = _run_virtual(model, loaded, mapped, options, seconds or _VIRTUAL_S)
-    else:
-        from board_daemon.daemon import run_board
+    with project_prints(as_json=as_json):
+        loaded = load_project(project)
+        model = read_profile(profile or _profile_of(loaded.configuration))
+        mapped = loaded.mapping(mapping)
+        options = BoardOptions(name, domain, seed, bitstreams)
+        if clock is ClockName.VIRTUAL:
+            done = _run_virtual(model, loaded, mapped, options, seconds or _VIRTUAL_S)
+        else:
+            from board_daemon.daemon import run_board
 
-        def on_ready() -> None:
-            if not as_json:
-                print(
-                    f"board {name} serves {loaded.configuration.name} under {mapped.name} on {model.name}",
-                    flush=True,
-                )
+            def on_ready() -> None:
+                if not as_json:
+                    print(
+                        f"board {name} serves {loaded.configuration.name} under {mapped.name} "
+                        f"on {model.name}",
+                        flush=True,
+                    )
 
-        done = run_board(router, model, loaded, mapped, options, on_ready, seconds)
+            done = run_board(router, model, loaded, mapped, options, on_ready, seconds)
     if as_json:
         print(json.dumps(done))
     else:
@@ -105,10 +108,11 @@ def _profile_of(configuration: BuildConfiguration) -> str:
 def _run_virtual(
     profile: Profile, project: Project, mapping: Mapping, options: BoardOptions, seconds: float
 ) -> dict[str, Any]:
-    """Return the status of the board after so many seconds of virtual time."""
+    """Return the status of the board after so many seconds of virtual time, or at Ctrl-C."""
     from reconros_zenoh.experiments.simulation import Simulation
 
     with Simulation(project.types()) as simulation:
         hosted = simulation.add_board(profile, project, mapping, options)
-        simulation.environment.run(until=round(seconds * 1e9))
+        with suppress(KeyboardInterrupt):
+            simulation.environment.run(until=round(seconds * 1e9))
         return status(hosted.board, hosted.executor)

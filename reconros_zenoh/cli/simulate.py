@@ -15,6 +15,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeElapsedCo
 from rich.table import Table
 from rich.text import Text
 
+from reconros_zenoh.cli.options import project_prints
 from reconros_zenoh.cli.service_commands import read_deployment
 from reconros_zenoh.experiments.deployment import DeploymentRun, prepare
 from reconros_zenoh.measure.statistics import format_ms
@@ -53,15 +54,18 @@ def simulate(
     nothing was lost.
     """
     plan = read_deployment(file, os.environ).changed(requests, seed)
-    run = DeploymentRun([plan] if boards is None else [plan.clone(number) for number in range(boards)])
     prepare(out)
-    with Progress(
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-        console=Console(stderr=True),
-        disable=as_json or not sys.stderr.isatty(),
-    ) as progress:
+    with (
+        project_prints(as_json=as_json),
+        Progress(
+            BarColumn(),
+            MofNCompleteColumn(),
+            TimeElapsedColumn(),
+            console=Console(stderr=True),
+            disable=as_json or not sys.stderr.isatty(),
+        ) as progress,
+    ):
+        run = DeploymentRun([plan] if boards is None else [plan.clone(number) for number in range(boards)])
         task = progress.add_task("", total=run.requests)
         run.run(lambda: progress.advance(task))
     run.write_records(out)

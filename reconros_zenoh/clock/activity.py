@@ -109,7 +109,7 @@ class Activity:
             self.parked = False
             self._advance(None)
 
-    def _advance(self, event: Awaitable | None) -> None:
+    def _advance(self, event: Awaitable | _Refused | None) -> None:
         """Run the generator until it parks, ends, or waits for something that has not happened."""
         while True:
             try:

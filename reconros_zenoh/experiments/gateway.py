@@ -5,8 +5,10 @@ from __future__ import annotations
 import os
 import platform
 import statistics
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from importlib.resources import as_file, files
+from itertools import product
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from board_daemon.hosting import BoardOptions, HostedBoard
@@ -21,7 +23,7 @@ from reconros_zenoh.project.mapping_file import CallbackMapping, Mapping
 from reconros_zenoh.transport.simulated import SimulatedNetwork
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Sequence
 
     import numpy as np
     from numpy.typing import NDArray
@@ -100,7 +102,8 @@ def measure_gateway(
 ) -> dict[str, Any]:
     """Return every cell with the means of `repeat` messages, beside what the paper's text says.
 
-    `on_cell` is called after each. Raise ExperimentError when a subscriber got something wrong or nothing.
+    `on_cell` is called after each. Ctrl-C keeps the cells that are complete. Raise ExperimentError when a
+    subscriber got something wrong or nothing.
     """
     if profile.model is None or profile.model.topics is None:
         raise UsageError(
@@ -109,19 +112,16 @@ def measure_gateway(
         )
     sizes = list(sizes)
     bodies = {size: random_body(size) for size in sizes}
-    cells = []
+    cells: list[Cell] = []
     overruns = 0
-    for publisher in publishers:
-        for size in sizes:
-            for count in counts:
-                times = {}
-                for variant in get_args(Variant):
-                    times[variant], late = _run(
-                        clock, profile, variant, publisher, count, bodies[size], repeat
-                    )
-                    overruns += late
-                cells.append(Cell(publisher, size, count, times["smt"], times["bridged"]))
-                on_cell()
+    with until_interrupted() as interruption:
+        for publisher, size, count in product(publishers, sizes, counts):
+            times = {}
+            for variant in get_args(Variant):
+                times[variant], late = _run(clock, profile, variant, publisher, count, bodies[size], repeat)
+                overruns += late
+            cells.append(Cell(publisher, size, count, times["smt"], times["bridged"]))
+            on_cell()
     return {
         "experiment": "gateway",
         "clock": clock,
@@ -131,7 +131,25 @@ def measure_gateway(
         "cells": [cell.as_json() for cell in cells],
         "anchors": anchors(cells),
         "host": host(overruns),
+        "interrupted": interruption.happened,
     }
+
+
+@dataclass(slots=True)
+class Interruption:
+    """Whether Ctrl-C or SIGTERM has ended a block."""
+
+    happened: bool = False
+
+
+@contextmanager
+def until_interrupted() -> Iterator[Interruption]:
+    """Run the block to its end or to Ctrl-C or SIGTERM, so that what was measured is kept."""
+    interruption = Interruption()
+    try:
+        yield interruption
+    except KeyboardInterrupt:
+        interruption.happened = True
 
 
 def host(overruns: int) -> dict[str, Any]:

@@ -14,10 +14,11 @@ import threading
 import time
 import zlib
 from collections import defaultdict
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import replace
 from functools import partial
 from importlib.resources import as_file, files
+from itertools import product
 from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar, get_args
 
 from board_daemon.hosting import BoardOptions, HostedBoard
@@ -28,7 +29,7 @@ from reconros_zenoh.clock.virtual import succeed_once
 from reconros_zenoh.clock.wall import WallEnvironment, keep_time
 from reconros_zenoh.errors import ExperimentError
 from reconros_zenoh.executor.callbacks import CallbackKind
-from reconros_zenoh.experiments.gateway import Cell, Times, Variant, host, setup_mapping
+from reconros_zenoh.experiments.gateway import Cell, Times, Variant, host, setup_mapping, until_interrupted
 from reconros_zenoh.experiments.wall import free_port
 from reconros_zenoh.project.loader import load_project
 from reconros_zenoh.project.mapping_file import CallbackMapping
@@ -80,19 +81,19 @@ def measure_native(
 ) -> dict[str, Any]:
     """Return every cell with the medians of `repeat` messages; `on_cell` is called after each.
 
+    Ctrl-C keeps the cells that are complete.
+
     Raise ExperimentError when a subscriber got something wrong or nothing.
     """
-    cells = []
-    with ExitStack() as networks:
+    cells: list[Cell] = []
+    with until_interrupted() as interruption, ExitStack() as networks:
         routers = {variant: f"tcp/127.0.0.1:{free_port()}" for variant in get_args(Variant)}
         for endpoint in routers.values():
             networks.enter_context(ZenohRouter.open(endpoint))
-        for size in sizes:
-            for count in counts:
-                begin = partial(_begin_cell, routers, size, count)
-                times = take_turns(begin, repeat)
-                cells.append(Cell("software", size, count, times["smt"], times["bridged"]))
-                on_cell()
+        for size, count in product(sizes, counts):
+            times = take_turns(partial(_begin_cell, routers, size, count), repeat)
+            cells.append(Cell("software", size, count, times["smt"], times["bridged"]))
+            on_cell()
     return {
         "experiment": "gateway",
         "clock": "wall",
@@ -103,6 +104,7 @@ def measure_native(
         "anchors": [],
         "copies": COPIES,
         "host": host(0),
+        "interrupted": interruption.happened,
     }
 
 
@@ -236,7 +238,7 @@ def _process(role: Role) -> Iterator[Connection]:
     function, arguments = role
     spawn = multiprocessing.get_context("spawn")
     here, there = spawn.Pipe()
-    process = spawn.Process(target=function, args=(there, *arguments), daemon=True)
+    process = spawn.Process(target=_play, args=(function, there, *arguments), daemon=True)
     process.start()
     there.close()
     try:
@@ -246,6 +248,12 @@ def _process(role: Role) -> Iterator[Connection]:
         process.join(_LIMIT_S)
         if process.is_alive():
             process.terminate()
+
+
+def _play(function: Callable[..., None], connection: Connection, *arguments: object) -> None:
+    """Run what the process is for, until it ends or nobody hears it any more."""
+    with suppress(BrokenPipeError):
+        function(connection, *arguments)
 
 
 class Receiver:

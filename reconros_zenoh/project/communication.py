@@ -36,17 +36,20 @@ def check_topics(configuration: BuildConfiguration) -> None:
         if resource.type in _ENDS:
             (hardware if resource.hardware_mapped else software)[topic_name(resource)].append(resource)
     _check_gateways(configuration, hardware, software)
-    bridged = {resolve(gateway.hw_topic, "/", "gateway") for gateway in configuration.gateways}
+    bridged = {
+        resolve(gateway.hw_topic, "/", gateway.name): resolve(gateway.sw_topic, "/", gateway.name)
+        for gateway in configuration.gateways
+    }
     for topic, ends in hardware.items():
         _check_ends(configuration, topic, ends)
         for end in software[topic]:
-            if topic not in bridged:
+            if bridged.get(topic) != topic:
                 raise FileError(
                     configuration.path,
                     end.line,
                     f"{topic} is mapped to hardware (line {ends[0].line}), and has a software-mapped "
-                    f"{_ENDS[end.type]} but no gateway.",
-                    f"Declare a `[ROSGateway@name]` with `HWTopic = {topic}`.",
+                    f"{_ENDS[end.type]} but no gateway to it.",
+                    f"Declare a `[ROSGateway@name]` with `HWTopic = {topic}` and `SWTopic = {topic}`.",
                 )
 
 

@@ -110,16 +110,15 @@ class Project:
 
         None stands for the first in the folder, or, if there is none, for the default.
         """
+        name_or_file = name_or_file or next(iter(self._mappings()), None)
         if name_or_file is None:
-            shipped = self._mappings()
-            if not shipped:
-                return Mapping.default(self.configuration)
-            name_or_file = next(iter(shipped))
-        mapping = read_mapping(
-            self.mapping_path(name_or_file),
-            bitstream_slots(self.configuration),
-            [slot.slot_id for slot in self.slots],
-        )
+            mapping = Mapping.default(self.configuration)
+        else:
+            mapping = read_mapping(
+                self.mapping_path(name_or_file),
+                bitstream_slots(self.configuration),
+                [slot.slot_id for slot in self.slots],
+            )
         check_places(self.configuration, mapping.callbacks)
         return mapping
 

@@ -55,7 +55,7 @@ def running_project(folder: Path) -> Iterator[None]:
         raise FileError(folder / path, line, str(error)) from error
     except ReconrosError:
         raise
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         path, line = _place(error, root)
         raise FileError(folder / path, line, f"{type(error).__name__}: {error}.") from error
     finally:
@@ -79,7 +79,7 @@ def _lies_in(module: ModuleType, root: Path) -> bool:
     return root in {path.parent, path.parent.parent if path.name == "__init__.py" else None}
 
 
-def _place(error: Exception, root: Path) -> tuple[Path, int | None]:
+def _place(error: BaseException, root: Path) -> tuple[Path, int | None]:
     """Return the file of the project, relative to it, and the line in which the error was raised."""
     places = [(Path(frame.filename), frame.lineno) for frame in traceback.extract_tb(error.__traceback__)]
     if isinstance(error, SyntaxError) and error.filename:

@@ -110,7 +110,12 @@ def new_project(folder: Path) -> list[Path]:
     paths = []
     for file, text in _FILES.items():
         path = folder / file.replace("NAME", name)
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text.replace("NAME", name), encoding="utf-8")
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(text.replace("NAME", name), encoding="utf-8")
+        except OSError as error:
+            raise UsageError(
+                f"{path} cannot be written ({error.strerror}). Choose a folder that you may write to."
+            ) from None
         paths.append(path)
     return paths

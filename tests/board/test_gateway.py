@@ -165,6 +165,7 @@ def test_a_message_that_no_fifo_holds_is_refused_and_the_gateway_goes_on() -> No
     side.publish_in_software(message(2))
     side.environment.run()
     assert side.gateway.refused == 1
+    assert side.board.context.rejections.counts() == {"fifo_size": 1}
     assert side.numbers() == [[2], [2], [1, 2]]
 
 

@@ -123,7 +123,7 @@ def test_a_message_larger_than_a_fifo_is_refused_and_reaches_nobody() -> None:
     stream.fifo("small", FifoPlan(message_bytes=99))
     stream.fifo("large")
     refused = stream.publish(message(100))
-    with pytest.raises(UsageError, match=r"100 bytes on hmt/board0/a does not fit a FIFO .* for 99"):
+    with pytest.raises(BadMessageError, match=r"100 bytes on hmt/board0/a does not fit a FIFO .* for 99"):
         stream.environment.run(until=refused)
     stream.publish(message(99))
     stream.environment.run()

@@ -143,6 +143,35 @@ def test_the_command_prints_one_json_object_and_draws(tmp_path) -> None:
     }
 
 
+def test_what_was_measured_before_an_interruption_is_kept(tmp_path, monkeypatch: pytest.MonkeyPatch) -> None:
+    measure = gateway._run
+    runs: list[object] = []
+
+    def interrupted(*arguments: Any) -> Any:
+        runs.append(arguments)
+        if len(runs) > 2:  # SMT and gateway of the first cell
+            raise KeyboardInterrupt
+        return measure(*arguments)
+
+    monkeypatch.setattr(gateway, "_run", interrupted)
+    result = run("--sizes", "10kB", "--subscribers", "2,4", "--json", "--out", str(tmp_path))
+    assert result.exit_code == 130
+    printed = json.loads(result.stdout)
+    assert printed["interrupted"] is True
+    assert [cell["subscribers"] for cell in printed["cells"]] == [2]
+    assert json.loads((tmp_path / "gateway.json").read_text()) == printed
+
+
+def test_a_folder_that_cannot_be_written_is_refused_before_anything_is_measured(
+    tmp_path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delattr(gateway, "_run")
+    (tmp_path / "file").touch()  # not even root can make a folder below it
+    result = run("--out", str(tmp_path / "file" / "x"))
+    assert isinstance(result.exception, UsageError)
+    assert "Choose another folder with --out" in str(result.exception)
+
+
 def test_the_command_prints_a_table(tmp_path) -> None:
     result = run("--sizes", "10kB", "--publisher", "software", "--out", str(tmp_path))
     assert "from software" in result.stdout

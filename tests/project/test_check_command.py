@@ -190,3 +190,14 @@ def test_a_damaged_file_reads_or_is_a_file_error(
         line = error.line
     assert line is not None
     assert 1 <= line <= content.count(b"\n") + content.count(b"\r") + 1
+
+
+def test_topics_that_cannot_be_mapped_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "build.cfg"
+    path.write_text(
+        "[ResourceGroup@g]\nnode = rosnode, /n\na = rossub, node, std_msgs/UInt32, /a, hw\n"
+        "number = rosmsg, std_msgs, msg, UInt32\nb = rospub, node, number, /a\n",
+        encoding="utf-8",
+    )
+    with pytest.raises(FileError, match=r"build\.cfg:5: /a is mapped to hardware \(line 3\)"):
+        run(path)

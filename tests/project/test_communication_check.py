@@ -36,6 +36,11 @@ SW = 'sw = rossub, node, image, "/a"\n'
     ("text", "line", "words"),
     {
         "software subscriber, no gateway": (HW + SW, 10, "has a software-mapped subscriber but no gateway"),
+        "software subscriber, gateway to another topic": (
+            HW + SW + GATEWAY.format("g", "/a", "/b", "sensor_msgs/Image"),
+            10,
+            "has a software-mapped subscriber but no gateway to it",
+        ),
         "gateway of another type": (
             HW + GATEWAY.format("g", "/a", "/b", "std_msgs/UInt32"),
             10,

@@ -128,6 +128,27 @@ def test_names_that_a_project_cannot_have(tmp_path: Path, name: str) -> None:
         invoke("new", f"{tmp_path}/{name}/" if name != "." else ".")
 
 
+def test_what_a_project_prints_is_not_in_the_json(blink: Path) -> None:
+    path = blink / "callbacks.py"
+    text = path.read_text(encoding="utf-8").replace("self.count += 1", "self.count += 1; print('counted')")
+    path.write_text("print('imported')\n" + text, encoding="utf-8")
+    assert run(blink, "--seconds", 1.05)["callbacks"]["count"]["failed"] == 0
+    output = invoke("run", blink, "--clock", "virtual", "--seconds", 0.25)
+    assert output.startswith("imported\ncounted\ncounted\n")
+
+
+def test_a_folder_that_cannot_be_written(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()  # not even root can make a folder below it
+    with pytest.raises(UsageError, match="cannot be written"):
+        invoke("new", tmp_path / "file" / "blink")
+
+
+@pytest.mark.parametrize("name", ["", "a/b", "a*", "a b"])
+def test_names_that_a_board_cannot_have(blink: Path, name: str) -> None:
+    with pytest.raises(UsageError, match="cannot name a board"):
+        run(blink, "--name", name)
+
+
 def test_a_folder_that_is_there_is_left_alone(blink: Path) -> None:
     (blink / "main.py").write_text("mine", encoding="utf-8")
     with pytest.raises(UsageError, match="is there already"):

@@ -51,6 +51,8 @@ MISTAKES = {
         "callbacks.py:1",
         "ZeroDivisionError",
     ),
+    "exit while importing": ("callbacks.py", '"""What', 'exit(0)\n"""What', "callbacks.py:1", "SystemExit"),
+    "no function": ("main.py", "=count.hardware", "='hls'", "main.py:8", "'hls', which cannot be called"),
     "no main": ("main.py", "def main", "def start", "main.py", "has no function `main`"),
     "error in main": ("main.py", "app.spin()", "app.spin(1, 2)", "main.py:9", "TypeError"),
     "error in a function that main calls": (
@@ -182,3 +184,17 @@ def test_modules_of_a_project_are_forgotten_and_those_of_its_environment_are_not
         start(tmp_path / "blink")
     assert not {package, f"{package}.first"} & set(sys.modules)
     assert sys.modules.pop("installed_there")
+
+
+def test_without_mapping_files_the_places_are_checked_too(tmp_path: Path) -> None:
+    folder = tmp_path / "blink"
+    new_project(folder)
+    for path in (folder / "mappings").iterdir():
+        path.unlink()
+    path = folder / "build.cfg"
+    text = path.read_text(encoding="utf-8").replace("HwSource = hls\n", "")
+    path.write_text(
+        text.replace('node, count_msg, "/count"', "node, blink_msgs/Count, /count, hw"), encoding="utf-8"
+    )
+    with pytest.raises(FileError, match=r"build\.cfg:22: The callback count is mapped to software"):
+        start(folder)
