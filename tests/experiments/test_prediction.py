@@ -90,19 +90,21 @@ def share(times_ms: Times, mapping: str, client: str, low_ms: float, high_ms: fl
 
 
 def side_peak(times_ms: Times, mapping: str) -> float:
-    """Return how much denser the hash's times are 42 ms off its period (+- 6) than next to there."""
+    """Return how much denser the hash's times are 42 ms off its period (+- 8) than next to there."""
     at, beside = 0.0, 0.0
     for center_ms in (250 - 42, 250 + 42):
-        at += share(times_ms, mapping, "hash", center_ms - 6, center_ms + 6)
-        beside += share(times_ms, mapping, "hash", center_ms - 12, center_ms - 6)
-        beside += share(times_ms, mapping, "hash", center_ms + 6, center_ms + 12)
+        at += share(times_ms, mapping, "hash", center_ms - 8, center_ms + 8)
+        beside += share(times_ms, mapping, "hash", center_ms - 16, center_ms - 8)
+        beside += share(times_ms, mapping, "hash", center_ms + 8, center_ms + 16)
     return at / beside
 
 
-def test_a_reconfiguration_shifts_the_hash_by_its_time_only_where_there_is_one(times_ms: Times) -> None:
-    assert side_peak(times_ms, "all_hardware") > 1.3
-    assert side_peak(times_ms, "mixed") < 1.2
-    assert side_peak(times_ms, "all_software") < 1.2
+def test_a_reconfiguration_shifts_the_hash_by_its_time_where_the_hash_shares_a_slot(times_ms: Times) -> None:
+    """The real board's peaks are 1.8 in all_hardware, 1.05 in mixed and 1.0 in all_software."""
+    peaks = {mapping: side_peak(times_ms, mapping) for mapping in MAPPINGS}
+    assert peaks["all_hardware"] > 1.4
+    assert peaks["mixed"] < 1.3
+    assert peaks["all_software"] < 1.3
 
 
 def test_mnist_waits_for_its_bitstream_only_where_it_shares_a_slot(times_ms: Times) -> None:
