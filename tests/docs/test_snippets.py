@@ -2,22 +2,26 @@
 
 A block of docs/ is marked behind its opening fence. ```python runs, all of a page in one namespace. With the
 name of a file behind the language (```ini robot/build.cfg) a block is written there first. ```console holds
-commands of `reconros` behind `$ `, and below each one lines of what it prints; `...` stands for any lines. A
-console block marked `by hand` needs a running board, a second terminal or minutes: its verbs and options are
-checked. Everything happens in a folder of its own.
+commands of `reconros` behind `$ `, and below each one lines of what it prints; `...` stands for any lines.
+The commands of a console block marked `terminals` are processes, at a router of the test's; those that run
+until Ctrl-C get it at the end. Everything happens in a folder of its own.
 """
 
 from __future__ import annotations
 
 import re
 import shlex
+import signal
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 import pytest
+from processes import Process, run
 from typer.testing import CliRunner
 
 from reconros_zenoh.cli.main import _VERBS, _application
+from reconros_zenoh.experiments.wall import free_port
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -76,6 +80,26 @@ def check_output(printed: list[str], shown: list[str], place: str) -> None:
         rest, anywhere = rest[at + 1 :], False
 
 
+def run_in_terminals(text: str, place: str) -> None:
+    """Run each command as a process and end those that go on."""
+    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    with ExitStack() as terminals:
+        running = []
+        for command, shown in transcript(text):
+            verb, *arguments = shlex.split(command, comments=True)[1:]
+            if verb in {"router", "run"}:
+                there, ready = ("--listen", "listens") if verb == "router" else ("--router", "serves")
+                process = terminals.enter_context(Process(verb, *arguments, there, endpoint))
+                process.wait_for(ready)
+                running.append(process)
+            else:
+                done = run(verb, *arguments, "--router", endpoint)
+                assert done.returncode == 0, f"{place}: {command}: {done.stderr}"
+                check_output(done.stdout.splitlines(), shown or ["..."], place)
+        for process in reversed(running):
+            assert process.end(signal.SIGINT) == 0, f"{place}: {process}"
+
+
 def test_every_page_is_found_from_the_readme() -> None:
     assert PAGES
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -91,13 +115,13 @@ def test_the_snippets_of_a_page(page: Path, tmp_path: Path, monkeypatch: pytest.
     for block in blocks(page):
         place = f"{page.name}:{block.line}"
         if block.language == "console":
-            assert block.rest in {"", "by hand"}, place
-            for command, shown in transcript(block.text):
-                if block.rest:
-                    invoke(command, "--help")
-                else:
+            assert block.rest in {"", "terminals"}, place
+            if block.rest:
+                run_in_terminals(block.text, place)
+            else:
+                for command, shown in transcript(block.text):
                     check_output(invoke(command), shown, place)
-                ran += 1
+            ran += 1
         elif block.rest:
             path = tmp_path / block.rest
             path.parent.mkdir(parents=True, exist_ok=True)
