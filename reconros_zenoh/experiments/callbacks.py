@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import platform
 import statistics
 import time
 from dataclasses import dataclass
@@ -17,6 +15,7 @@ from reconros_zenoh.board.osif import Osif
 from reconros_zenoh.clock.virtual import VirtualEnvironment
 from reconros_zenoh.clock.wall import WallEnvironment
 from reconros_zenoh.errors import ExperimentError, UsageError
+from reconros_zenoh.experiments.provenance import machine
 from reconros_zenoh.experiments.roundtrip import application_folder
 from reconros_zenoh.project.loader import load_project
 from reconros_zenoh.project.mapping_file import CallbackMapping, Mapping
@@ -108,7 +107,7 @@ def measure_callbacks(
         "basis_memif": model.memif.bandwidth.basis,
         "basis_calls": model.osif.call.basis,
         "host": {
-            "machine": f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores",
+            "machine": machine(),
             "overruns": overruns,
         },
     }

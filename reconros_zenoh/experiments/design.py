@@ -2,19 +2,13 @@
 
 from __future__ import annotations
 
-import json
-import os
-import platform
-import shlex
-import sys
 from dataclasses import dataclass
-from datetime import UTC, datetime
-from importlib.metadata import version
 from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from reconros_zenoh.errors import UsageError
+from reconros_zenoh.experiments.provenance import machine, provenance, write_experiment
 from reconros_zenoh.measure.record import read_record
 from reconros_zenoh.measure.statistics import summarise
 
@@ -94,19 +88,10 @@ def finish(plan: DesignPlan, statuses: Mapping[str, Mapping[str, Any]]) -> dict[
             chain: _difference(one[f"{chain}_ms"]["median"], two[f"{chain}_ms"]["median"])
             for chain in ("filter", "control")
         },
-        "date": datetime.now(UTC).isoformat(timespec="seconds"),
-        "command": shlex.join(["reconros", *sys.argv[1:]]),
-        "machine": f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores",
-        "versions": {
-            "Python": platform.python_version(),
-            **{name: version(name) for name in ("reconros-zenoh", "eclipse-zenoh", "simpy", "numpy")},
-        },
+        **provenance(),
+        "machine": machine(),
     }
-    path = plan.folder / "experiment.json"
-    try:
-        path.write_text(json.dumps(experiment, indent=1), encoding="utf-8")
-    except OSError as error:
-        raise UsageError(f"{path} cannot be written ({error.strerror}). Choose another --out.") from None
+    write_experiment(plan.folder, experiment)
     return experiment
 
 

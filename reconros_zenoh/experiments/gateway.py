@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import platform
 import statistics
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -18,6 +16,7 @@ from reconros_zenoh.board.spans import Timeline
 from reconros_zenoh.clock.virtual import VirtualEnvironment, succeed_once
 from reconros_zenoh.clock.wall import WallEnvironment
 from reconros_zenoh.errors import ExperimentError, UsageError
+from reconros_zenoh.experiments.provenance import machine
 from reconros_zenoh.project.loader import load_project
 from reconros_zenoh.project.mapping_file import CallbackMapping, Mapping
 from reconros_zenoh.transport.simulated import SimulatedNetwork
@@ -155,7 +154,7 @@ def until_interrupted() -> Iterator[Interruption]:
 def host(overruns: int) -> dict[str, Any]:
     """Return what is known of this host, and how often it was slower than the model."""
     return {
-        "machine": f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores",
+        "machine": machine(),
         "overruns": overruns,
     }
 

@@ -2,19 +2,13 @@
 
 from __future__ import annotations
 
-import json
-import os
-import platform
-import shlex
-import sys
 from dataclasses import dataclass, field
-from datetime import UTC, datetime
-from importlib.metadata import version
 from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from reconros_zenoh.errors import UsageError
+from reconros_zenoh.experiments.provenance import machine, provenance, write_experiment
 from reconros_zenoh.measure.compare import experiment_tables
 from reconros_zenoh.measure.record import read_record
 
@@ -68,7 +62,7 @@ class BoardReport:
         """Return the overruns of all mappings together and the worst lag."""
         hosts = [status["host"] for status in self.statuses.values()]
         return {
-            "machine": f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores",
+            "machine": machine(),
             "overruns": sum(host["overruns"] for host in hosts),
             **{
                 key: max((host[key] for host in hosts if host[key] is not None), default=None)
@@ -94,18 +88,9 @@ def finish(plan: Plan, report: BoardReport, *, interrupted: bool) -> dict[str, A
         "rejected": {mapping: status["rejected"] for mapping, status in report.statuses.items()},
         "interrupted": interrupted,
         "profile": plan.profile,
-        "date": datetime.now(UTC).isoformat(timespec="seconds"),
-        "command": shlex.join(["reconros", *sys.argv[1:]]),
-        "versions": {
-            "Python": platform.python_version(),
-            **{name: version(name) for name in ("reconros-zenoh", "eclipse-zenoh", "simpy", "numpy")},
-        },
+        **provenance(),
     }
-    path = plan.folder / "experiment.json"
-    try:
-        path.write_text(json.dumps(experiment, indent=1), encoding="utf-8")
-    except OSError as error:
-        raise UsageError(f"{path} cannot be written ({error.strerror}). Choose another --out.") from None
+    write_experiment(plan.folder, experiment)
     return experiment
 
 

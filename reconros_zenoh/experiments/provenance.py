@@ -1,0 +1,44 @@
+"""What an experiment's object says besides its figures: when, where, with what; and its file."""
+
+from __future__ import annotations
+
+import json
+import os
+import platform
+import shlex
+import sys
+from datetime import UTC, datetime
+from importlib.metadata import version
+from typing import TYPE_CHECKING, Any
+
+from reconros_zenoh.errors import UsageError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from pathlib import Path
+
+
+def machine() -> str:
+    """Return the kind of this computer and the number of its cores."""
+    return f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores"
+
+
+def provenance() -> dict[str, Any]:
+    """Return the date, the command and the versions of what took part."""
+    return {
+        "date": datetime.now(UTC).isoformat(timespec="seconds"),
+        "command": shlex.join(["reconros", *sys.argv[1:]]),
+        "versions": {
+            "Python": platform.python_version(),
+            **{name: version(name) for name in ("reconros-zenoh", "eclipse-zenoh", "simpy", "numpy")},
+        },
+    }
+
+
+def write_experiment(folder: Path, experiment: Mapping[str, Any]) -> None:
+    """Write the object as experiment.json; raise UsageError when that fails."""
+    path = folder / "experiment.json"
+    try:
+        path.write_text(json.dumps(experiment, indent=1), encoding="utf-8")
+    except OSError as error:
+        raise UsageError(f"{path} cannot be written ({error.strerror}). Choose another --out.") from None
