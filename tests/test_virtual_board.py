@@ -136,3 +136,15 @@ def test_a_histogram_is_a_picture() -> None:
 def test_a_histogram_of_nothing() -> None:
     with pytest.raises(rz.UsageError, match="Measure some first"):
         rz.histogram([np.nan])
+
+
+def test_what_makes_no_sense_is_refused() -> None:
+    for numbers in ({"slots": -1}, {"software_workers": -2}, {"hardware_workers": -1}):
+        with pytest.raises(rz.UsageError, match=r"there cannot be -. workers"):
+            rz.VirtualBoard(**numbers)
+    board = rz.VirtualBoard()
+    with pytest.raises(rz.UsageError, match="a period of 0 ns"):
+        board.timer(0)
+    for depth in (0, -1):
+        with pytest.raises(rz.UsageError, match="keeps none"):
+            board.subscription("/in", WORD, rz.QosProfile(depth=depth))

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 from reconros_zenoh.board.spans import Timeline
 from reconros_zenoh.board.stream import Stream
-from reconros_zenoh.errors import BadMessageError
+from reconros_zenoh.errors import BadMessageError, UsageError
 from reconros_zenoh.ros.qos import QosProfile, Reliability
 
 if TYPE_CHECKING:
@@ -248,6 +248,8 @@ class TimerSource:
     """
 
     def __init__(self, board: Board, period_ns: int) -> None:
+        if period_ns < 1:
+            raise UsageError(f"a timer cannot have a period of {period_ns} ns. Give it a longer one.")
         self._board = board
         self._period_ns = period_ns
         self._expired_ns: int | None = None

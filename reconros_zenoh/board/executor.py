@@ -74,6 +74,10 @@ class Executor:
         bitstreams: Path | None = None,
         kind: ExecutorKind = "reconros",
     ) -> None:
+        if software_workers < 0 or hardware_workers < 0:
+            raise UsageError(
+                f"there cannot be {min(software_workers, hardware_workers)} workers. Give 0 or more."
+            )
         if hardware_workers > len(board.slots):
             raise UsageError(
                 f"{hardware_workers} hardware workers need as many slots, the project has {len(board.slots)}."

@@ -214,7 +214,12 @@ def _number(declaration: _Declaration, argument: str, text: str) -> int:
         raise declaration.option.error(
             f"{argument} of {declaration.name} is {text!r}, not a number.", "Write a whole number."
         )
-    return int(text)
+    number = int(text)
+    if argument == "period_ms" and not number:
+        raise declaration.option.error(
+            f"The period of the timer {declaration.name} is 0 ms.", "Write 1 or more."
+        )
+    return number
 
 
 def _fifo(declaration: _Declaration) -> FifoPlan:

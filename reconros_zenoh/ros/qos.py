@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from enum import IntEnum
 from typing import Self, TypeVar
 
+from reconros_zenoh.errors import UsageError
+
 INFINITE_NS = 2**63 - 1
 """The infinite duration of rmw: 9223372036 s and 854775807 ns."""
 
@@ -60,7 +62,11 @@ class QosProfile:
 
     @property
     def queue_depth(self) -> int | None:
-        """How many samples a queue holds at most; None with KEEP_ALL."""
+        """How many samples a queue holds at most; None with KEEP_ALL. Raises UsageError if that is none."""
+        if self.history is History.KEEP_LAST and self.depth < 1:
+            raise UsageError(
+                f"a queue that keeps the last {self.depth} messages keeps none. Raise the depth."
+            )
         return self.depth if self.history is History.KEEP_LAST else None
 
     def encode(self) -> str:

@@ -85,6 +85,7 @@ MISTAKES = {
     "empty name": ('x = rosnode, ""', "cannot be read"),
     "poll interval": ('x = rossub, node, msg, "/t", soon', "poll_us of x is 'soon'"),
     "period": ("x = rostmr, node, 2.5", "period_ms of x is '2.5'"),
+    "no period": ("x = rostmr, node, 0", "The period of the timer x is 0 ms"),
     "undeclared node": ("x = rostmr, nodes, 10", "no group declares one"),
     "undeclared message": ('x = rossub, node, msgs, "/t"', "the rosmsg msgs"),
     "reference of another type": ("x = rostmr, msg, 10", "msg is a rosmsg (line 5)"),
