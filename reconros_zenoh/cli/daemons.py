@@ -12,7 +12,7 @@ import typer
 from rich.console import Console
 
 from reconros_zenoh.board.control import ask_status
-from reconros_zenoh.cli.options import ENDPOINT, AsJson, Domain, Router
+from reconros_zenoh.cli.options import ENDPOINT, AsJson, Domain, MappingName, Router
 from reconros_zenoh.cli.status_screen import print_status
 from reconros_zenoh.experiments.roundtrip import application_folder
 from reconros_zenoh.transport.zenoh import ZenohRouter, ZenohTransport
@@ -50,9 +50,7 @@ def board(
         Path | None,
         typer.Argument(help="Folder of a ReconROS project.", show_default="the round-trip application"),
     ] = None,
-    mapping: Annotated[
-        str, typer.Option(metavar="NAME|FILE", help="Which callback runs where.")
-    ] = "all_hardware",
+    mapping: MappingName = None,
     profile: Annotated[
         str, typer.Option(metavar="NAME|FILE", help="The kind of board; native models nothing.")
     ] = "miniitx-zynq7100",
@@ -75,14 +73,15 @@ def board(
     from reconros_zenoh.project.loader import load_project
 
     loaded = load_project(project or application_folder())
+    mapped = loaded.mapping(mapping)
     run_board(
         router,
         read_profile(profile),
         loaded,
-        loaded.mapping(mapping),
+        mapped,
         BoardOptions(name, domain, seed, bitstreams, tap),
         lambda: print(
-            f"board {name} serves {loaded.configuration.name} under {mapping} on {profile}", flush=True
+            f"board {name} serves {loaded.configuration.name} under {mapped.name} on {profile}", flush=True
         ),
     )
 

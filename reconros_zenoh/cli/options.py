@@ -31,6 +31,14 @@ Router = Annotated[
     str, typer.Option(metavar="ENDPOINT", envvar="RECONROS_ROUTER", help="The Zenoh router to connect to.")
 ]
 Domain = Annotated[int, typer.Option(min=0, max=232, envvar="ROS_DOMAIN_ID", help="The ROS domain.")]
+MappingName = Annotated[
+    str | None,
+    typer.Option(
+        metavar="NAME|FILE",
+        help="Which callback runs where.",
+        show_default="the first in PROJECT/mappings; without any, in hardware what can be",
+    ),
+]
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
 
 

@@ -15,7 +15,15 @@ from rich.console import Console
 from board_daemon.hosting import BoardOptions
 from reconros_zenoh.board.control import status
 from reconros_zenoh.board.profile import profile_names, read_profile
-from reconros_zenoh.cli.options import ENDPOINT, AsJson, ClockName, Domain, Router, project_prints
+from reconros_zenoh.cli.options import (
+    ENDPOINT,
+    AsJson,
+    ClockName,
+    Domain,
+    MappingName,
+    Router,
+    project_prints,
+)
 from reconros_zenoh.cli.status_screen import print_status
 from reconros_zenoh.errors import UsageError
 from reconros_zenoh.project.loader import load_project
@@ -33,14 +41,7 @@ _VIRTUAL_S = 10.0
 
 def run(
     project: Annotated[Path, typer.Argument(help="Folder of a ReconROS project.")],
-    mapping: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAME|FILE",
-            help="Which callback runs where.",
-            show_default="the first in PROJECT/mappings; without any, in hardware what can be",
-        ),
-    ] = None,
+    mapping: MappingName = None,
     profile: Annotated[
         str | None,
         typer.Option(
