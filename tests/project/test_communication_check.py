@@ -129,3 +129,13 @@ def test_a_fifo_that_cannot_be_is_refused(tmp_path, end, words) -> None:
     with pytest.raises(FileError, match=words) as refused:
         configuration(tmp_path, f"hw = {end}\n")
     assert refused.value.line == 9
+
+
+def test_a_gateway_shares_its_slot_with_no_callback(tmp_path) -> None:
+    read = configuration(tmp_path, HW + THREAD + GATEWAY.format("g", "/a", "/a", "sensor_msgs/Image"))
+    check_places(read, {"t": CallbackMapping(slots=(0,))})
+    with pytest.raises(
+        FileError, match="gateway g sits in a slot that the callback t is mapped to"
+    ) as refused:
+        check_places(read, {"t": CallbackMapping(slots=(0, 1))})
+    assert refused.value.line == 15
