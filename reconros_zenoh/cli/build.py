@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from reconros_zenoh.board.profile import read_profile
-from reconros_zenoh.cli.options import project_prints
+from reconros_zenoh.cli.options import AsJson, project_prints
 from reconros_zenoh.project.loader import load_project
 
 
@@ -21,7 +21,7 @@ def build(
     profile: Annotated[
         str, typer.Option(metavar="NAME|FILE", help="The kind of board, which decides the sizes.")
     ] = "miniitx-zynq7100",
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
+    as_json: AsJson = False,
 ) -> None:
     """Write a partial bitstream for each callback and each slot it can be built for."""
     folder = out or project / "bitstreams"

@@ -13,6 +13,7 @@ from rich.table import Table
 from rich.text import Text
 
 from reconros_zenoh.board.profile import read_profile
+from reconros_zenoh.cli.options import AsJson
 from reconros_zenoh.cli.progress import run_bar
 from reconros_zenoh.errors import UsageError
 from reconros_zenoh.experiments.calibration import (
@@ -66,7 +67,7 @@ def calibrate(
         int, typer.Option(min=20, help="Requests per client and run; more lower the noise.")
     ] = 300,
     seed: Annotated[int, typer.Option(help="Seed of requests and model.")] = 0,
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
+    as_json: AsJson = False,
 ) -> None:
     """Fit the calibrated constants of a profile to measured round trips; all others are held."""
     start = read_profile(profile)

@@ -13,6 +13,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from reconros_zenoh.cli.options import AsJson
 from reconros_zenoh.project.build_cfg import read_build_cfg
 from reconros_zenoh.project.communication import check_topics
 from reconros_zenoh.project.interfaces import read_interfaces
@@ -41,7 +42,7 @@ _ROLES = {
 
 def check(
     project: Annotated[Path, typer.Argument(metavar="build.cfg|PROJECT", help="A project file or folder.")],
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
+    as_json: AsJson = False,
 ) -> None:
     """Read a ReconROS project file and show what it says; exit status 2 when it cannot be used.
 

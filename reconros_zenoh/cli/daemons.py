@@ -12,7 +12,16 @@ import typer
 from rich.console import Console
 
 from reconros_zenoh.board.control import ask_status
-from reconros_zenoh.cli.options import ENDPOINT, AsJson, Domain, MappingName, Router
+from reconros_zenoh.cli.options import (
+    ENDPOINT,
+    AsJson,
+    Bitstreams,
+    BoardName,
+    Domain,
+    MappingName,
+    ModelSeed,
+    Router,
+)
 from reconros_zenoh.cli.status_screen import print_status
 from reconros_zenoh.experiments.roundtrip import application_folder
 from reconros_zenoh.transport.zenoh import ZenohRouter, ZenohTransport
@@ -54,14 +63,11 @@ def board(
     profile: Annotated[
         str, typer.Option(metavar="NAME|FILE", help="The kind of board; native models nothing.")
     ] = "miniitx-zynq7100",
-    name: Annotated[str, typer.Option(help="The board's name in the network.")] = "board0",
+    name: BoardName = "board0",
     router: Router = ENDPOINT,
     domain: Domain = 0,
-    seed: Annotated[int, typer.Option(help="Seed of what is random in the model.")] = 0,
-    bitstreams: Annotated[
-        Path | None,
-        typer.Option(help="Folder of `reconros build`.", show_default="bitstreams held in memory"),
-    ] = None,
+    seed: ModelSeed = 0,
+    bitstreams: Bitstreams = None,
     tap: Annotated[
         bool, typer.Option("--tap", help="Let hardware-mapped topics out, as hmt/<board>/<topic>.")
     ] = False,

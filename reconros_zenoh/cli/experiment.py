@@ -11,7 +11,7 @@ from rich.console import Console
 
 from reconros_zenoh.cli.design import design
 from reconros_zenoh.cli.gateway_experiment import gateway
-from reconros_zenoh.cli.options import ClockName, Out, Profile, Seed
+from reconros_zenoh.cli.options import AsJson, ClockName, Out, Profile, Seed
 from reconros_zenoh.cli.progress import ExperimentProgress
 from reconros_zenoh.cli.tables import callbacks, reconfiguration
 from reconros_zenoh.errors import UsageError
@@ -50,7 +50,7 @@ def roundtrip(
     seed: Seed = 0,
     out: Out = Path("results"),
     profile: Profile = "miniitx-zynq7100",
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
+    as_json: AsJson = False,
 ) -> None:
     """Section V-C: five clients against one board, under each mapping; beside the real board's round trips.
 

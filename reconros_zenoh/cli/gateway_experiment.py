@@ -12,7 +12,7 @@ from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
-from reconros_zenoh.cli.options import ClockName, Out, Profile
+from reconros_zenoh.cli.options import AsJson, ClockName, Out, Profile
 from reconros_zenoh.cli.progress import run_bar
 from reconros_zenoh.errors import UsageError
 
@@ -44,7 +44,7 @@ def gateway(
     repeat: Annotated[int, typer.Option(min=1, help="Messages per cell.")] = 500,
     profile: Profile = "zcu104",
     out: Out = Path("results/gateway"),
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
+    as_json: AsJson = False,
 ) -> None:
     """One publisher, 2 to 8 subscribers in hardware and one in software: on an SMT, and with a gateway.
 

@@ -39,6 +39,12 @@ MappingName = Annotated[
         show_default="the first in PROJECT/mappings; without any, in hardware what can be",
     ),
 ]
+BoardName = Annotated[str, typer.Option(help="The board's name in the network.")]
+ModelSeed = Annotated[int, typer.Option(help="Seed of what is random in the model.")]
+Bitstreams = Annotated[
+    Path | None,
+    typer.Option(help="Folder of `reconros build`.", show_default="bitstreams held in memory"),
+]
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
 
 

@@ -18,9 +18,12 @@ from reconros_zenoh.board.profile import profile_names, read_profile
 from reconros_zenoh.cli.options import (
     ENDPOINT,
     AsJson,
+    Bitstreams,
+    BoardName,
     ClockName,
     Domain,
     MappingName,
+    ModelSeed,
     Router,
     project_prints,
 )
@@ -57,14 +60,11 @@ def run(
             min=0.001, help="How long.", show_default=f"until Ctrl-C, in virtual time {_VIRTUAL_S:g}"
         ),
     ] = None,
-    name: Annotated[str, typer.Option(help="The board's name in the network.")] = "board0",
+    name: BoardName = "board0",
     router: Router = ENDPOINT,
     domain: Domain = 0,
-    seed: Annotated[int, typer.Option(help="Seed of what is random in the model.")] = 0,
-    bitstreams: Annotated[
-        Path | None,
-        typer.Option(help="Folder of `reconros build`.", show_default="bitstreams held in memory"),
-    ] = None,
+    seed: ModelSeed = 0,
+    bitstreams: Bitstreams = None,
     as_json: AsJson = False,
 ) -> None:
     """Host a project on an emulated board of its TargetBoard, and show at the end what the board has done."""

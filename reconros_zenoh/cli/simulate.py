@@ -15,7 +15,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeElapsedCo
 from rich.table import Table
 from rich.text import Text
 
-from reconros_zenoh.cli.options import project_prints
+from reconros_zenoh.cli.options import AsJson, project_prints
 from reconros_zenoh.cli.service_commands import read_deployment
 from reconros_zenoh.experiments.deployment import DeploymentRun, prepare
 from reconros_zenoh.measure.statistics import format_ms
@@ -46,7 +46,7 @@ def simulate(
     out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for the records.")] = Path(
         "results/simulate"
     ),
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
+    as_json: AsJson = False,
 ) -> None:
     """Run a deployment, the very file that `up` runs, in one process in virtual time.
 
