@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, cast
+import signal
+import threading
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any, cast
 
 import simpy
+from simpy.events import URGENT
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
 
 
 class VirtualEnvironment(simpy.Environment):
@@ -28,6 +32,15 @@ class VirtualEnvironment(simpy.Environment):
         """Return the time of this very moment [ns]; callable from any thread."""
         return self.now
 
+    def run(self, until: float | simpy.Event | None = None) -> Any:
+        """Run until that time [ns], that event, or the end of all events; see `simpy.Environment.run`.
+
+        A handler of SIGINT or SIGTERM (Python's raises KeyboardInterrupt) is called between two events: what
+        it raises somewhere in the model could be lost in a finalizer. A second signal is handled at once.
+        """
+        with self._signals_between_events():
+            return super().run(until)
+
     def post(self, function: Callable[..., object], *arguments: object) -> None:
         """Have `function(*arguments)` called by the event loop now, after what is due already."""
         self.call_later(0, function, *arguments)
@@ -36,8 +49,35 @@ class VirtualEnvironment(simpy.Environment):
         """Have `function(*arguments)` called by the event loop after `delay_ns`, which is not negative."""
         if delay_ns < 0:
             raise ValueError(f"Negative delay {delay_ns}")
-        # It has what the event loop asks of an event.
-        self.schedule(cast("simpy.Event", _Call(function, arguments)), delay=delay_ns)
+        self.schedule(_call(function, *arguments), delay=delay_ns)
+
+    @contextmanager
+    def _signals_between_events(self) -> Iterator[None]:
+        handlers: dict[int, Callable[..., object]] = {}
+        received: list[tuple[int, object]] = []
+
+        def receive(number: int, frame: object) -> None:
+            signal.signal(number, cast("Any", handlers[number]))
+            received.append((number, frame))
+            self.schedule(_call(handle), URGENT)
+
+        def handle() -> None:
+            while received:
+                number, frame = received.pop()
+                handlers[number](number, frame)
+
+        if threading.current_thread() is threading.main_thread():
+            for number in (signal.SIGINT, signal.SIGTERM):
+                handler = signal.getsignal(number)
+                if callable(handler):
+                    handlers[number] = handler
+                    signal.signal(number, receive)
+        try:
+            yield
+        finally:
+            for taken, former in handlers.items():
+                signal.signal(taken, cast("Any", former))
+            handle()  # what came after the last event
 
 
 class _Call:
@@ -53,6 +93,11 @@ class _Call:
 
     def __call__(self, _: object) -> None:
         self._function(*self._arguments)
+
+
+def _call(function: Callable[..., object], *arguments: object) -> simpy.Event:
+    # It has what the event loop asks of an event.
+    return cast("simpy.Event", _Call(function, arguments))
 
 
 def succeed_once(event: simpy.Event) -> None:
