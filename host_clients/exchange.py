@@ -43,7 +43,10 @@ class Exchange(ABC):
 
 
 class TopicExchange(Exchange):
-    """Publishes requests on one topic and listens for the answers on another: base of three clients."""
+    """Publishes requests on one topic and listens for the answers on another: base of three clients.
+
+    Each request is encoded once.
+    """
 
     request_topic: str
     request_type: str
@@ -53,6 +56,7 @@ class TopicExchange(Exchange):
     def __init__(self, inputs: list[Any]) -> None:
         self._inputs = inputs
         self._expected = cache(self.expected)
+        self._encoded: dict[int, bytes] = {}
 
     @abstractmethod
     def request(self, types: TypeRegistry, given: Any) -> object:
@@ -74,7 +78,7 @@ class TopicExchange(Exchange):
         on_matching: Callable[[bool], None],
     ) -> None:
         """Subscribe to the answers, then announce the requests."""
-        self._requests = [self.request(types, given) for given in self._inputs]
+        self._types = types
         node.subscription(
             types.message(self.answer_type), self.answer_topic, lambda received: on_answer(received.message)
         )
@@ -84,7 +88,11 @@ class TopicExchange(Exchange):
 
     def ask(self, index: int) -> None:
         """Publish request number `index`, counting round and round."""
-        self._publisher.publish(self._requests[index % len(self._requests)])
+        place = index % len(self._inputs)
+        if place not in self._encoded:
+            message = self.request(self._types, self._inputs[place])
+            self._encoded[place] = b"".join(self._publisher.message_type.encode(message))
+        self._publisher.publish_encoded((self._encoded[place],))
 
     def is_right(self, index: int, answer: Any) -> bool:
         """Tell whether `answer` is the right one to request number `index`."""

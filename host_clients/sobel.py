@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
+from xxhash import xxh3_128_digest
 
 from host_clients.exchange import TopicExchange
 from host_clients.image import image_message
@@ -13,7 +13,6 @@ from reconros_zenoh.applications.roundtrip.kernels.sobel import sobel
 
 if TYPE_CHECKING:
     from numpy.random import Generator
-    from numpy.typing import NDArray
 
     from reconros_zenoh.ros.types import TypeRegistry
 
@@ -34,10 +33,10 @@ class SobelExchange(TopicExchange):
         """Return the picture as a message."""
         return image_message(types, "bgr8", given)
 
-    def expected(self, index: int) -> NDArray[np.uint8]:
-        """Return what the kernel computes."""
-        return sobel(self._inputs[index]).reshape(-1)
+    def expected(self, index: int) -> bytes:
+        """Return the digest of what the kernel computes."""
+        return xxh3_128_digest(sobel(self._inputs[index]).data)
 
-    def equal(self, message: Any, expected: NDArray[np.uint8]) -> bool:
-        """Compare all pixels."""
-        return bool(message.encoding == "bgr8" and np.array_equal(message.data, expected))
+    def equal(self, message: Any, expected: bytes) -> bool:
+        """Compare all pixels, by their digest: it reads one picture where a comparison reads two."""
+        return bool(message.encoding == "bgr8" and xxh3_128_digest(message.data.data) == expected)

@@ -7,6 +7,7 @@ import time
 from collections import OrderedDict
 from concurrent.futures import Future, wait
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any, Generic, TypeVar, cast
 
 import numpy as np
@@ -71,7 +72,7 @@ class Host:
     """Runs the real computation while the model decides when its result is ready.
 
     In wall time what takes long runs in a pool of threads, what is known to be over soon in line. In virtual
-    time everything runs in line, and a pure kernel computes equal inputs once.
+    time everything runs in line, and a pure kernel computes equal inputs once for all boards of the process.
     """
 
     def __init__(
@@ -85,7 +86,6 @@ class Host:
         self._in_line_ns = in_line_ns
         self._pool = None if threads is None else ThreadPool(threads, "computation")
         self._expected_ns: dict[object, float] = {}
-        self._results: OrderedDict[object, object] = OrderedDict()
         self.overruns = Overruns()
 
     def start(
@@ -100,12 +100,14 @@ class Host:
         """
         if limit is not None:
             return self._start_limited(limit, function, *arguments)
-        if self._pool is not None and task is None:
-            return self._pool.submit(function, *arguments)
-        if self._pool is not None and self._expected_ns.get(task, self._in_line_ns) >= self._in_line_ns:
-            return self._pool.submit(self._timed, task, function, *arguments)
+        if self._pool is not None:
+            if task is None:
+                return self._pool.submit(function, *arguments)
+            if self._expected_ns.get(task, self._in_line_ns) >= self._in_line_ns:
+                return self._pool.submit(self._timed, task, function, *arguments)
+            function = partial(self._timed, task, function)
         try:
-            return _Done(self._timed(task, function, *arguments), None)
+            return _Done(function(*arguments), None)
         except Exception as error:  # noqa: BLE001 - handed to whoever asks for the result
             return _Done(None, error)
 
@@ -157,15 +159,7 @@ class Host:
         """Return `kernel(*arguments)` of a pure kernel; called in the thread of a started computation."""
         if self._pool is not None:
             return kernel(*arguments)
-        key = (kernel, *(_identity(argument) for argument in arguments))
-        if key in self._results:
-            self._results.move_to_end(key)
-            return self._results[key]  # type: ignore[return-value] # stored below under the same kernel
-        result = kernel(*arguments)
-        self._results[key] = result
-        if len(self._results) > _RESULTS_KEPT:
-            self._results.popitem(last=False)
-        return result
+        return _results.of(kernel, *arguments)
 
     def close(self) -> None:
         """Start no other computation, and wait for a while for those that run."""
@@ -188,6 +182,31 @@ def measured(function: Callable[..., R], *arguments: object) -> tuple[R, int]:
     """Return `function(*arguments)` and how long it took here [ns]."""
     started_ns = time.perf_counter_ns()
     return function(*arguments), time.perf_counter_ns() - started_ns
+
+
+class _Results:
+    """The results of pure kernels that were asked for last."""
+
+    def __init__(self) -> None:
+        self._kept: OrderedDict[object, object] = OrderedDict()
+        self._lock = threading.Lock()
+
+    def of(self, kernel: Callable[..., R], *arguments: object) -> R:
+        """Return `kernel(*arguments)`, computed unless it is known."""
+        key = (kernel, *(_identity(argument) for argument in arguments))
+        with self._lock:
+            if key in self._kept:
+                self._kept.move_to_end(key)
+                return self._kept[key]  # type: ignore[return-value] # stored below under the same kernel
+        result = kernel(*arguments)
+        with self._lock:
+            self._kept[key] = result
+            if len(self._kept) > _RESULTS_KEPT:
+                self._kept.popitem(last=False)
+        return result
+
+
+_results = _Results()
 
 
 class _Unchanging:

@@ -51,10 +51,10 @@ class SharedResource:
     def __init__(self, environment: VirtualEnvironment, capacity: float, per_job: float) -> None:
         self._environment = environment
         self._capacity = capacity
-        self._per_job = per_job
+        self._per_job = min(per_job, capacity)
         self._jobs: list[_Job] = []
         self._holds = 0
-        self._contended = False
+        self._contended = False  # else every job has all that it can use
 
     def serve(
         self, work: float, limit: float | None = None, *, first: bool = False
@@ -67,7 +67,10 @@ class SharedResource:
             return
         job = _Job(work, self._environment.now, self._per_job if limit is None else limit, first=first)
         self._jobs.append(job)
-        self._share(job)
+        if self._contended or (len(self._jobs) > 1 and self._demand() > self._capacity):
+            self._share()
+        else:
+            self._plan(job, job.limit)
         try:
             yield job
         except Exception:  # the caller is stopped
@@ -91,19 +94,20 @@ class SharedResource:
         self._holds -= 1
         self._share()
 
-    def _share(self, new: _Job | None = None) -> None:
-        """Give every job its rate, and a new completion where that changes; `new` is the one that came."""
+    def _demand(self) -> float:
         demand = 0.0
         for job in self._jobs:
             demand += job.limit
-        if not self._holds and demand <= self._capacity:
-            # Where every other job has all it can use already, nothing changes for them.
-            for job in self._jobs if self._contended else (new,) if new else ():
+        return demand
+
+    def _share(self) -> None:
+        """Give every job its rate, and a new completion where that changes."""
+        self._contended = self._holds > 0 or self._demand() > self._capacity
+        if not self._contended:
+            for job in self._jobs:
                 if job.rate != job.limit:
                     self._plan(job, job.limit)
-            self._contended = False
             return
-        self._contended = True
         left = self._capacity
         for group in ([job for job in self._jobs if job.first], [job for job in self._jobs if not job.first]):
             # Whoever can use less than an equal share leaves the rest to the others.
@@ -132,5 +136,6 @@ class SharedResource:
         if job.due_ns == self._environment.now:  # else its rate has changed since
             job.due_ns = None
             self._jobs.remove(job)
-            self._share()
+            if self._contended:
+                self._share()
             job.fire()

@@ -49,7 +49,7 @@ class VirtualEnvironment(simpy.Environment):
         """Have `function(*arguments)` called by the event loop after `delay_ns`, which is not negative."""
         if delay_ns < 0:
             raise ValueError(f"Negative delay {delay_ns}")
-        self.schedule(_call(function, *arguments), delay=delay_ns)
+        self.schedule(_Call(function, arguments), delay=delay_ns)  # type: ignore[arg-type]
 
     @contextmanager
     def _signals_between_events(self) -> Iterator[None]:
@@ -59,7 +59,7 @@ class VirtualEnvironment(simpy.Environment):
         def receive(number: int, frame: object) -> None:
             signal.signal(number, cast("Any", handlers[number]))
             received.append((number, frame))
-            self.schedule(_call(handle), URGENT)
+            self.schedule(_Call(handle, ()), URGENT)  # type: ignore[arg-type]
 
         def handle() -> None:
             while received:
@@ -81,7 +81,10 @@ class VirtualEnvironment(simpy.Environment):
 
 
 class _Call:
-    """A call that is due at some time: an event whose only callback is itself, at half the cost of one."""
+    """A call that is due at some time: it has what the event loop asks of an event, at half the cost of one.
+
+    Its only callback is itself.
+    """
 
     __slots__ = ("_arguments", "_function", "callbacks")
     _ok = True
@@ -93,11 +96,6 @@ class _Call:
 
     def __call__(self, _: object) -> None:
         self._function(*self._arguments)
-
-
-def _call(function: Callable[..., object], *arguments: object) -> simpy.Event:
-    # It has what the event loop asks of an event.
-    return cast("simpy.Event", _Call(function, arguments))
 
 
 def succeed_once(event: simpy.Event) -> None:

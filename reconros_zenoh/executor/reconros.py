@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from reconros_zenoh.executor.callbacks import CallbackEntry, Dispatch
 
 _WITH_POSITION = (CallbackKind.SUB, CallbackKind.SRV, CallbackKind.CLT)
+_BEFORE_THE_FIRST = -1
 
 
 class OffsetVector:
@@ -24,11 +25,16 @@ class OffsetVector:
         # The paper initialises Position with the length of the list, so that the first search starts over.
         self._position = {kind: len(lists[kind]) for kind in _WITH_POSITION}
 
+    def wrap(self) -> None:
+        """Do what searches of empty sets do: let every `Position` wrap."""
+        for kind in _WITH_POSITION:
+            self._position[kind] = _BEFORE_THE_FIRST
+
     def search(self, kind: CallbackKind, ready: int) -> int | None:
         """Return the first set bit behind `Position` and move there; wrap and return None at the end."""
         behind = ready >> (self._position[kind] + 1)
         if not behind:
-            self._position[kind] = -1
+            self._position[kind] = _BEFORE_THE_FIRST
             return None
         index = self._position[kind] + 1 + lowest(behind)
         self._position[kind] = index
@@ -61,10 +67,13 @@ class ReconrosExecutor:
         timers = self.callbacks[CallbackKind.TMR].ready(resource)
         if timers:
             return self._take(CallbackKind.TMR, lowest(timers), resource)
-        ready = [(kind, self.callbacks[kind].ready(resource)) for kind in _WITH_POSITION]
         offsets = self._offsets.get(worker)
         if offsets is None:
             offsets = self._offsets[worker] = OffsetVector(self.callbacks)
+        ready = [(kind, self.callbacks[kind].ready(resource)) for kind in _WITH_POSITION]
+        if not any(entries for _, entries in ready):
+            offsets.wrap()
+            return None
         # Twice: the first round may only have wrapped every Position.
         for _ in range(2):
             for kind, entries in ready:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 from contextlib import ExitStack
-from functools import cache
+from functools import lru_cache
 from itertools import count
 from typing import TYPE_CHECKING, Self
 
@@ -12,7 +12,7 @@ from board_daemon.hosting import HostedBoard
 from host_clients.camera import Camera
 from host_clients.closed_loop import ClosedLoop
 from host_clients.scope import Scope
-from host_clients.suite import exchange
+from host_clients.suite import EXCHANGES, exchange
 from host_clients.viewer import Viewer
 from reconros_zenoh.clock.virtual import VirtualEnvironment, succeed_once
 from reconros_zenoh.errors import TransportError
@@ -36,6 +36,8 @@ if TYPE_CHECKING:
     from reconros_zenoh.project.mapping_file import Mapping
     from reconros_zenoh.ros.types import TypeRegistry
 
+_exchange = lru_cache(maxsize=2 * len(EXCHANGES))(exchange)
+
 
 class Simulation:
     """Boards and clients in one event loop until all clients and cameras are done.
@@ -51,7 +53,6 @@ class Simulation:
         self.environment = VirtualEnvironment()
         self._sessions = count(1)
         self._types = types
-        self._exchange = cache(exchange)
         self._done: list[simpy.Event] = []
         self._closing = ExitStack()
         self.begin_network()
@@ -87,7 +88,7 @@ class Simulation:
         loop = ClosedLoop(
             self.environment,
             # Each client has endpoints of its own; requests and answers stay those of the one that is copied.
-            copy.copy(self._exchange(options.name, options.seed)),
+            copy.copy(_exchange(options.name, options.seed)),
             context.node(f"{options.name}_client"),
             self._types,
             requests=options.requests,
