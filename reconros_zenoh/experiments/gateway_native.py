@@ -8,44 +8,25 @@ noted his time: on few cores the checks would be in each other's way.
 from __future__ import annotations
 
 import multiprocessing
-import signal
 import statistics
-import threading
 import time
-import zlib
 from collections import defaultdict
 from contextlib import ExitStack, contextmanager, suppress
-from dataclasses import replace
 from functools import partial
-from importlib.resources import as_file, files
 from itertools import product
 from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar, get_args
 
-from board_daemon.hosting import BoardOptions, HostedBoard
-from reconros_zenoh.applications.gateway.nodes import random_body
-from reconros_zenoh.board.executor import Executor
-from reconros_zenoh.board.profile import read_profile
-from reconros_zenoh.clock.virtual import succeed_once
-from reconros_zenoh.clock.wall import WallEnvironment, keep_time
 from reconros_zenoh.errors import ExperimentError
-from reconros_zenoh.executor.callbacks import CallbackKind
-from reconros_zenoh.experiments.gateway import Cell, Times, Variant, host, setup_mapping, until_interrupted
+from reconros_zenoh.experiments.gateway import Cell, Times, Variant, host, until_interrupted
+from reconros_zenoh.experiments.gateway_processes import run_board, run_listener, run_publisher
 from reconros_zenoh.experiments.wall import free_port
-from reconros_zenoh.project.loader import load_project
-from reconros_zenoh.project.mapping_file import CallbackMapping
-from reconros_zenoh.rmw.node import Context
-from reconros_zenoh.ros.types import TypeRegistry
-from reconros_zenoh.transport.memory import tune_memory
-from reconros_zenoh.transport.zenoh import ZenohRouter, ZenohTransport
+from reconros_zenoh.transport.zenoh import ZenohRouter
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
     from multiprocessing.connection import Connection
 
-    from reconros_zenoh.board.callback import HardwareThread
-    from reconros_zenoh.clock.activity import Awaitable
-    from reconros_zenoh.project.application import Application
-    from reconros_zenoh.project.mapping_file import Mapping as CallbackPlaces
+    from reconros_zenoh.experiments.gateway_processes import Receipt
 
 COPIES = [
     (
@@ -60,20 +41,14 @@ COPIES = [
 ]
 
 K = TypeVar("K")
-_TOPIC = "/a"
-_TYPE = "sensor_msgs/msg/Image"
 _LIMIT_S = 20.0
 _WARM_UP = 5
 _SITTINGS = 2
 _LOST_S = 2.0
 _MOST_LOST = 0.1
-_S = 1_000_000_000
 
 Role: TypeAlias = "tuple[Callable[..., None], tuple[object, ...]]"
 """What a process runs, and its arguments after its connection."""
-
-Receipt = tuple[str, int, int]
-"""A subscriber's name, the number of the message, and the transmission time [ns]."""
 
 
 def measure_native(
@@ -81,9 +56,8 @@ def measure_native(
 ) -> dict[str, Any]:
     """Return every cell with the medians of `repeat` messages; `on_cell` is called after each.
 
-    Ctrl-C keeps the cells that are complete.
-
-    Raise ExperimentError when a subscriber got something wrong or nothing.
+    Ctrl-C keeps the cells that are complete. Raise ExperimentError when a subscriber got
+    something wrong or nothing.
     """
     cells: list[Cell] = []
     with until_interrupted() as interruption, ExitStack() as networks:
@@ -150,8 +124,8 @@ def native_setup(processes: ExitStack, router: str, variant: Variant, size: int,
     """Return the setup of a variant of a cell, in the network of its router."""
     return Setup(
         processes,
-        [(_run_board, (router, variant, count)), (_run_listener, (router,))],
-        (_run_publisher, (router, size)),
+        [(run_board, (router, variant, count)), (run_listener, (router,))],
+        (run_publisher, (router, size)),
     )
 
 
@@ -205,7 +179,7 @@ def _round(
     source: Connection, receivers: Sequence[Connection], number: int, limit_s: float
 ) -> dict[str, int]:
     """Return the transmission times [ns] by subscriber of a message, checked."""
-    source.send(number)
+    _send(source, number)
     times: dict[str, int] = {}
     deadline = time.monotonic() + limit_s
     for receiver in receivers:
@@ -216,20 +190,31 @@ def _round(
             raise ExperimentError(f"instead of message {number} came {got}.")
         times.update({name: transmission_ns for name, _, transmission_ns in got})
     for receiver in receivers:
-        receiver.send("check")
+        _send(receiver, "check")
         problem = _receive(receiver, time.monotonic() + _LIMIT_S)
         if problem:
             raise ExperimentError(problem)
     return times
 
 
-def _receive(connection: Connection, deadline: float) -> Any:
-    if not connection.poll(max(0.0, deadline - time.monotonic())):
-        raise TimeoutError
+def _send(connection: Connection, what: object) -> None:
     try:
+        connection.send(what)
+    except ConnectionError:
+        raise _ended_early() from None
+
+
+def _receive(connection: Connection, deadline: float) -> Any:
+    try:
+        if not connection.poll(max(0.0, deadline - time.monotonic())):
+            raise TimeoutError
         return connection.recv()
-    except EOFError:
-        raise ExperimentError("a process of the experiment ended early; its reason stands above.") from None
+    except (EOFError, ConnectionError):
+        raise _ended_early() from None
+
+
+def _ended_early() -> ExperimentError:
+    return ExperimentError("a process of the experiment ended early; its reason stands above.")
 
 
 @contextmanager
@@ -252,148 +237,5 @@ def _process(role: Role) -> Iterator[Connection]:
 
 def _play(function: Callable[..., None], connection: Connection, *arguments: object) -> None:
     """Run what the process is for, until it ends or nobody hears it any more."""
-    with suppress(BrokenPipeError):
+    with suppress(ConnectionError):
         function(connection, *arguments)
-
-
-class Receiver:
-    """Notes who got which message when, and checks the bodies when it is asked to."""
-
-    def __init__(self, connection: Connection, readers: int) -> None:
-        self._connection = connection
-        self._readers = readers
-        self._receipts: list[Receipt] = []
-        self._bodies: list[tuple[Any, int]] = []
-
-    def note(self, name: str, image: Any) -> None:
-        """Note that a subscriber has the message now."""
-        now_ns = time.monotonic_ns()
-        number, crc = image.header.frame_id.split()
-        if self._receipts and self._receipts[0][1] != int(number):
-            self._receipts.clear()  # of a message that others have lost
-        sent_ns = image.header.stamp.sec * _S + image.header.stamp.nanosec
-        self._receipts.append((name, int(number), now_ns - sent_ns))
-        self._bodies.append((image.data, int(crc, 16)))
-        if len(self._receipts) == self._readers:
-            receipts, self._receipts = self._receipts, []
-            self._connection.send(receipts)
-
-    def check(self) -> None:
-        """Answer with what is wrong with a body, or with nothing."""
-        bodies, self._bodies = self._bodies, []
-        wrong = [crc for body, crc in bodies if zlib.crc32(body) != crc]
-        self._connection.send(
-            f"{len(wrong)} of {len(bodies)} messages came with other bytes." if wrong else ""
-        )
-
-
-def _run_board(connection: Connection, router: str, variant: Variant, count: int) -> None:
-    begin_process()
-    environment = WallEnvironment()
-    stop = environment.event()
-    receiver = Receiver(connection, count)
-    with as_file(files("reconros_zenoh.applications.gateway") / variant) as folder:
-        project = load_project(folder)
-    with ZenohTransport.open(router) as transport:
-        hosted = HostedBoard(
-            environment,
-            transport,
-            read_profile("native"),
-            replace(project, main=partial(_run_hardware_nodes, receiver)),
-            _hardware_only(setup_mapping("software", count)),
-            BoardOptions(),
-        )
-
-        def obey() -> None:
-            for _ in commands(connection):
-                environment.post(receiver.check)
-            environment.post(succeed_once, stop)
-
-        threading.Thread(target=obey, daemon=True).start()
-        connection.send("ready")
-        try:
-            environment.run(until=stop)
-        finally:
-            hosted.close()
-
-
-def _hardware_only(mapping: CallbackPlaces) -> CallbackPlaces:
-    """Return the mapping without its software nodes, which have processes of their own."""
-    places = {name: place if place.slots else CallbackMapping() for name, place in mapping.callbacks.items()}
-    return mapping.model_copy(update={"callbacks": places})
-
-
-def _run_hardware_nodes(receiver: Receiver, app: Application) -> None:
-    """Register the hardware nodes and spin."""
-    executor = Executor(app.board, app.mapping.software_workers, app.mapping.hardware_workers)
-    for name, place in app.mapping.callbacks.items():
-        if place.slots:
-            executor.add_hw_callback(
-                name,
-                place.slots,
-                CallbackKind.SUB,
-                app.source(name, "sub"),
-                partial(_hardware_node, receiver, name),
-            )
-    app.spin(executor)
-
-
-def _hardware_node(
-    receiver: Receiver, name: str, thread: HardwareThread
-) -> Generator[Awaitable, object, None]:
-    image = yield from thread.get_init_data()
-    yield from thread.mem_read(image.data)
-    receiver.note(name, image)
-
-
-def _run_listener(connection: Connection, router: str) -> None:
-    begin_process()
-    receiver = Receiver(connection, 1)
-    with ZenohTransport.open(router) as transport:
-        Context(transport).node("software").subscription(
-            TypeRegistry().message(_TYPE),
-            _TOPIC,
-            lambda received: receiver.note("software", received.message),
-        )
-        connection.send("ready")
-        for _ in commands(connection):
-            receiver.check()
-
-
-def _run_publisher(connection: Connection, router: str, size: int) -> None:
-    begin_process()
-    types = TypeRegistry()
-    body = random_body(size)
-    crc = zlib.crc32(body.data)
-    image_type, header = types.message(_TYPE), types.message("std_msgs/msg/Header").cls
-    stamp = types.message("builtin_interfaces/msg/Time").cls
-    with ZenohTransport.open(router) as transport:
-        publisher = Context(transport).node("publisher").publisher(image_type, _TOPIC)
-        for number in commands(connection):
-            seconds, nanoseconds = divmod(time.monotonic_ns(), _S)
-            image = image_type.cls(
-                header=header(stamp=stamp(sec=seconds, nanosec=nanoseconds), frame_id=f"{number} {crc:08x}"),
-                height=1,
-                width=size,
-                encoding="mono8",
-                is_bigendian=0,
-                step=size,
-                data=body,
-            )
-            publisher.publish(image)
-
-
-def begin_process() -> None:
-    """Make this process punctual, and leave Ctrl-C to the one that started it."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C ends the experiment, and that its processes
-    keep_time()
-    tune_memory()
-
-
-def commands(connection: Connection) -> Iterator[Any]:
-    """Yield what is asked for until nobody asks any more."""
-    while True:
-        try:
-            yield connection.recv()
-        except (EOFError, OSError):
-            return

@@ -21,15 +21,8 @@ from table import arguments, free_port, print_result
 
 from reconros_zenoh.applications.gateway.nodes import random_body
 from reconros_zenoh.experiments.gateway import COUNTS, SIZES
-from reconros_zenoh.experiments.gateway_native import (
-    COPIES,
-    Receiver,
-    Setup,
-    begin_process,
-    commands,
-    native_setup,
-    take_turns,
-)
+from reconros_zenoh.experiments.gateway_native import COPIES, Setup, native_setup, take_turns
+from reconros_zenoh.experiments.gateway_processes import Receiver, begin_process, commands
 from reconros_zenoh.transport.zenoh import ZenohRouter
 
 if TYPE_CHECKING:

@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import multiprocessing
 import subprocess
 import sys
+from contextlib import ExitStack
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
 
 from reconros_zenoh.errors import ExperimentError
-from reconros_zenoh.experiments.gateway_native import Receiver, take_turns
+from reconros_zenoh.experiments.gateway_native import Setup, take_turns
+from reconros_zenoh.experiments.gateway_processes import Receiver
 
 if TYPE_CHECKING:
+    from multiprocessing.connection import Connection
     from pathlib import Path
 
 
@@ -81,3 +85,30 @@ def test_too_many_lost_messages_end_the_experiment() -> None:
 
     with pytest.raises(ExperimentError, match="x: 3 of 3 messages were lost"):
         take_turns(lambda _: {"x": Losing()}, 3)  # type: ignore[dict-item] # all of a setup that it needs
+
+
+def receive(connection: Connection) -> None:
+    """Be a receiver that notes every message."""
+    connection.send("ready")
+    for number in itertools.count(1):
+        connection.send([("hardware_0", number, 1), ("software", number, 1)])
+        connection.recv()
+        connection.send("")
+
+
+def publish(connection: Connection, messages: int) -> None:
+    """Be a source that dies after so many messages."""
+    for _ in range(messages):
+        connection.recv()
+
+
+@pytest.mark.parametrize("messages", [0, 5, 7])
+def test_a_process_that_dies_ends_the_experiment_with_a_reason(messages: int) -> None:
+    def measure() -> None:
+        with ExitStack() as processes:
+            setup = Setup(processes, [(receive, ())], (publish, (messages,)))
+            while True:
+                setup.measure()
+
+    with pytest.raises(ExperimentError, match="ended early"):
+        measure()

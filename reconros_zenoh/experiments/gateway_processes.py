@@ -1,0 +1,193 @@
+"""What the processes of the gateway experiment on this host run: publisher, software subscriber, and board.
+
+Each has a connection to the process that measures, and ends when nobody holds the other end any more.
+"""
+
+from __future__ import annotations
+
+import signal
+import threading
+import time
+import zlib
+from dataclasses import replace
+from functools import partial
+from importlib.resources import as_file, files
+from typing import TYPE_CHECKING, Any
+
+from board_daemon.hosting import BoardOptions, HostedBoard
+from reconros_zenoh.applications.gateway.nodes import random_body
+from reconros_zenoh.board.executor import Executor
+from reconros_zenoh.board.profile import read_profile
+from reconros_zenoh.clock.virtual import succeed_once
+from reconros_zenoh.clock.wall import WallEnvironment, keep_time
+from reconros_zenoh.executor.callbacks import CallbackKind
+from reconros_zenoh.experiments.gateway import setup_mapping
+from reconros_zenoh.project.loader import load_project
+from reconros_zenoh.project.mapping_file import CallbackMapping
+from reconros_zenoh.rmw.node import Context
+from reconros_zenoh.ros.types import TypeRegistry
+from reconros_zenoh.transport.memory import tune_memory
+from reconros_zenoh.transport.zenoh import ZenohTransport
+
+if TYPE_CHECKING:
+    from collections.abc import Generator, Iterator
+    from multiprocessing.connection import Connection
+
+    from reconros_zenoh.board.callback import HardwareThread
+    from reconros_zenoh.clock.activity import Awaitable
+    from reconros_zenoh.experiments.gateway import Variant
+    from reconros_zenoh.project.application import Application
+    from reconros_zenoh.project.mapping_file import Mapping
+
+_TOPIC = "/a"
+_TYPE = "sensor_msgs/msg/Image"
+_S = 1_000_000_000
+
+Receipt = tuple[str, int, int]
+"""A subscriber's name, the number of the message, and the transmission time [ns]."""
+
+
+class Receiver:
+    """Notes who got which message when, and checks the bodies when it is asked to."""
+
+    def __init__(self, connection: Connection, readers: int) -> None:
+        self._connection = connection
+        self._readers = readers
+        self._receipts: list[Receipt] = []
+        self._bodies: list[tuple[Any, int]] = []
+
+    def note(self, name: str, image: Any) -> None:
+        """Note that a subscriber has the message now."""
+        now_ns = time.monotonic_ns()
+        number, crc = image.header.frame_id.split()
+        if self._receipts and self._receipts[0][1] != int(number):
+            self._receipts.clear()  # of a message that others have lost
+        sent_ns = image.header.stamp.sec * _S + image.header.stamp.nanosec
+        self._receipts.append((name, int(number), now_ns - sent_ns))
+        self._bodies.append((image.data, int(crc, 16)))
+        if len(self._receipts) == self._readers:
+            receipts, self._receipts = self._receipts, []
+            self._connection.send(receipts)
+
+    def check(self) -> None:
+        """Answer with what is wrong with a body, or with nothing."""
+        bodies, self._bodies = self._bodies, []
+        wrong = [crc for body, crc in bodies if zlib.crc32(body) != crc]
+        self._connection.send(
+            f"{len(wrong)} of {len(bodies)} messages came with other bytes." if wrong else ""
+        )
+
+
+def run_board(connection: Connection, router: str, variant: Variant, count: int) -> None:
+    """Be the board with so many hardware nodes."""
+    begin_process()
+    environment = WallEnvironment()
+    stop = environment.event()
+    receiver = Receiver(connection, count)
+    with as_file(files("reconros_zenoh.applications.gateway") / variant) as folder:
+        project = load_project(folder)
+    with ZenohTransport.open(router) as transport:
+        hosted = HostedBoard(
+            environment,
+            transport,
+            read_profile("native"),
+            replace(project, main=partial(_run_hardware_nodes, receiver)),
+            _hardware_only(setup_mapping("software", count)),
+            BoardOptions(),
+        )
+
+        def obey() -> None:
+            for _ in commands(connection):
+                environment.post(receiver.check)
+            environment.post(succeed_once, stop)
+
+        threading.Thread(target=obey, daemon=True).start()
+        connection.send("ready")
+        try:
+            environment.run(until=stop)
+        finally:
+            hosted.close()
+
+
+def _hardware_only(mapping: Mapping) -> Mapping:
+    """Return the mapping without its software nodes, which have processes of their own."""
+    places = {name: place if place.slots else CallbackMapping() for name, place in mapping.callbacks.items()}
+    return mapping.model_copy(update={"callbacks": places})
+
+
+def _run_hardware_nodes(receiver: Receiver, app: Application) -> None:
+    """Register the hardware nodes and spin."""
+    executor = Executor(app.board, app.mapping.software_workers, app.mapping.hardware_workers)
+    for name, place in app.mapping.callbacks.items():
+        if place.slots:
+            executor.add_hw_callback(
+                name,
+                place.slots,
+                CallbackKind.SUB,
+                app.source(name, "sub"),
+                partial(_hardware_node, receiver, name),
+            )
+    app.spin(executor)
+
+
+def _hardware_node(
+    receiver: Receiver, name: str, thread: HardwareThread
+) -> Generator[Awaitable, object, None]:
+    image = yield from thread.get_init_data()
+    yield from thread.mem_read(image.data)
+    receiver.note(name, image)
+
+
+def run_listener(connection: Connection, router: str) -> None:
+    """Be the software subscriber."""
+    begin_process()
+    receiver = Receiver(connection, 1)
+    with ZenohTransport.open(router) as transport:
+        Context(transport).node("software").subscription(
+            TypeRegistry().message(_TYPE),
+            _TOPIC,
+            lambda received: receiver.note("software", received.message),
+        )
+        connection.send("ready")
+        for _ in commands(connection):
+            receiver.check()
+
+
+def run_publisher(connection: Connection, router: str, size: int) -> None:
+    """Publish an image of so many bytes whenever its number is sent."""
+    begin_process()
+    types = TypeRegistry()
+    body = random_body(size)
+    crc = zlib.crc32(body.data)
+    image_type, header = types.message(_TYPE), types.message("std_msgs/msg/Header").cls
+    stamp = types.message("builtin_interfaces/msg/Time").cls
+    with ZenohTransport.open(router) as transport:
+        publisher = Context(transport).node("publisher").publisher(image_type, _TOPIC)
+        for number in commands(connection):
+            seconds, nanoseconds = divmod(time.monotonic_ns(), _S)
+            image = image_type.cls(
+                header=header(stamp=stamp(sec=seconds, nanosec=nanoseconds), frame_id=f"{number} {crc:08x}"),
+                height=1,
+                width=size,
+                encoding="mono8",
+                is_bigendian=0,
+                step=size,
+                data=body,
+            )
+            publisher.publish(image)
+
+
+def begin_process() -> None:
+    """Make this process punctual, and leave Ctrl-C to the one that started it."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C ends the experiment, and that its processes
+    keep_time()
+    tune_memory()
+
+
+def commands(connection: Connection) -> Iterator[Any]:
+    """Yield what is asked for until nobody asks any more."""
+    while True:
+        try:
+            yield connection.recv()
+        except (EOFError, OSError):
+            return
