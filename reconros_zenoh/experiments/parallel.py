@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import os
 import signal
+import threading
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
-from multiprocessing import get_context
+from multiprocessing import get_context, parent_process
 from typing import TYPE_CHECKING, NamedTuple, Self
 
 import numpy as np
@@ -44,7 +45,7 @@ class ParallelRuns:
     """
 
     def __enter__(self) -> Self:
-        self._pool = ProcessPoolExecutor(os.cpu_count(), get_context("spawn"), _ignore_interrupt)
+        self._pool = ProcessPoolExecutor(os.cpu_count(), get_context("spawn"), _begin_process)
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -94,9 +95,17 @@ def varied(profile: Profile, changes: Mapping[tuple[str, ...], float | bool]) ->
     return Profile.model_validate(content)
 
 
-def _ignore_interrupt() -> None:
-    """Leave Ctrl-C to the process that gives the work."""
+def _begin_process() -> None:
+    """Leave Ctrl-C to the process that gives the work, and end with it even when it is killed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    parent = parent_process()
+    assert parent is not None
+    parent.join()
+    os._exit(1)
 
 
 def records_of(run: Run) -> dict[str, Record]:

@@ -1,0 +1,32 @@
+"""Runs in several processes: none of these outlives the one that started them."""
+
+from __future__ import annotations
+
+from signal import SIGINT, SIGKILL, SIGTERM, Signals
+
+import psutil
+import pytest
+from processes import LIMIT_S, Process
+
+PROGRAM = """
+from reconros_zenoh.board.profile import read_profile
+from reconros_zenoh.experiments.parallel import ParallelRuns, Run
+from reconros_zenoh.experiments.roundtrip import application_folder
+
+if __name__ == "__main__":
+    mapping = application_folder() / "mappings" / "mixed.toml"
+    runs = [Run(read_profile("miniitx-zynq7100"), mapping, 20, seed) for seed in range(500)]
+    with ParallelRuns() as parallel:
+        for _ in parallel.records(runs):
+            print("made a run")
+"""
+
+
+@pytest.mark.parametrize("number", [SIGINT, SIGTERM, SIGKILL], ids=lambda number: number.name)
+def test_no_process_outlives_the_one_that_started_it(number: Signals) -> None:
+    with Process(program=("-c", PROGRAM)) as process:
+        process.wait_for("made a run")
+        children = psutil.Process(process.pid).children(recursive=True)
+        assert len(children) >= 2
+        process.end(number)
+        assert not psutil.wait_procs(children, timeout=LIMIT_S)[1]
