@@ -7,7 +7,7 @@ import hashlib
 import json
 import os
 import signal
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -85,7 +85,8 @@ class StateFolder:
             try:
                 fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except BlockingIOError:
-                os.kill(self._read().pid, signal.SIGTERM)
+                with suppress(ProcessLookupError):  # it has just ended by itself
+                    os.kill(self._read().pid, signal.SIGTERM)
                 fcntl.flock(lock, fcntl.LOCK_EX)  # the owner lets go when everything has stopped
             record = self._read()
             self._record.unlink()

@@ -36,7 +36,7 @@ def up(
     folder = StateFolder(file, environment)
     console = _console(quiet=as_json)
     screen = ServiceScreen(console, deployment.services, None if detach or as_json else folder.logs)
-    failure: ExperimentError | typer.Exit | None = None
+    failure: ExperimentError | SystemExit | typer.Exit | None = None
     error = ""
     try:
         with screen:
@@ -46,6 +46,8 @@ def up(
                 supervise(deployment, folder, environment, screen.show)
     except KeyboardInterrupt:
         failure, error = typer.Exit(130), "interrupted"
+    except SystemExit as ending:  # SIGTERM or SIGHUP, see `EndingSignals`
+        failure, error = ending, "interrupted"
     except ExperimentError as caught:
         failure, error = caught, str(caught)
     if as_json:

@@ -217,19 +217,26 @@ def test_a_killed_supervisor_is_no_obstacle(services: Services, run: Run) -> Non
     assert run("down").stdout.startswith("server: stopped")
 
 
-def test_ctrl_c_while_waiting_for_health_stops_all(services: Services, start: Start) -> None:
+@pytest.mark.parametrize(
+    ("options", "number", "status"),
+    [(["-d"], signal.SIGINT, 130), ([], signal.SIGINT, 130), ([], signal.SIGTERM, 143)],
+)
+def test_a_signal_while_waiting_for_health_stops_all(
+    services: Services, start: Start, options: list[str], number: signal.Signals, status: int
+) -> None:
     os.mkfifo(services.folder / "pipe")
     services.compose_file(
         services.service(
             "server", "(folder / 'pipe').write_text('x'); block()", services.when_written("never")
         )
     )
-    with start("up", "-d", "--json") as process:
+    with start("up", *options, "--json") as process:
         assert (services.folder / "pipe").read_text() == "x"
-        process.send_signal(signal.SIGINT)
+        process.send_signal(number)
         output, errors = process.communicate()
-        assert (process.returncode, errors) == (130, "")
-    assert json.loads(output)["services"] == {"server": "stopped"}
+        assert (process.returncode, errors) == (status, "")
+    result = json.loads(output)
+    assert (result["services"], result["error"]) == ({"server": "stopped"}, "interrupted")
     services.assert_gone()
 
 
