@@ -4,13 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
-from reconros_zenoh.errors import FileError, UsageError
 from reconros_zenoh.mapping.graph import ComputationGraph, Side, Topic
-from reconros_zenoh.ros.names import resolve
+from reconros_zenoh.project.communication import gateway_pair, topic_name
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from reconros_zenoh.project.build_cfg import BuildConfiguration, ReconosThread
     from reconros_zenoh.project.mapping_file import Mapping
     from reconros_zenoh.project.resource_groups import Resource
@@ -30,12 +27,8 @@ class TopicEnd(NamedTuple):
 
 def gateway_topics(configuration: BuildConfiguration) -> dict[str, str]:
     """Return the full name of each gateway's hardware-mapped topic with that of its software-mapped one."""
-    return {
-        _full_name(configuration.path, gateway.line, gateway.hw_topic, "/gateway"): _full_name(
-            configuration.path, gateway.line, gateway.sw_topic, "/gateway"
-        )
-        for gateway in configuration.gateways
-    }
+    pairs = [gateway_pair(configuration.path, gateway) for gateway in configuration.gateways]
+    return {pair.hmt: pair.smt for pair in pairs}
 
 
 def topic_ends(configuration: BuildConfiguration, mapping: Mapping | None = None) -> list[TopicEnd]:
@@ -55,8 +48,7 @@ def topic_ends(configuration: BuildConfiguration, mapping: Mapping | None = None
         if resource.type not in {"rossub", "rospub"}:
             continue
         assert resource.node is not None
-        assert resource.ros_name is not None
-        topic = _full_name(configuration.path, resource.line, resource.ros_name, resource.node)
+        topic = topic_name(configuration.path, resource)
         if resource.hardware_mapped:
             topic = gateways.get(topic, topic)
         used_on = frozenset(sides.get(resource.group, {Side.SOFTWARE}))
@@ -99,14 +91,6 @@ def read_project_graph(configuration: BuildConfiguration, mapping: Mapping | Non
 def _side(thread: ReconosThread, mapping: Mapping | None) -> Side:
     in_hardware = thread.hardware is not None if mapping is None else mapping.callbacks[thread.name].slots
     return Side.HARDWARE if in_hardware else Side.SOFTWARE
-
-
-def _full_name(path: Path, line: int, topic: str, node: str) -> str:
-    namespace, _, base = f"/{node.lstrip('/')}".rpartition("/")
-    try:
-        return resolve(topic, namespace or "/", base)
-    except UsageError as error:
-        raise FileError(path, line, str(error)) from None
 
 
 def _notes(configuration: BuildConfiguration, *, inner: bool) -> tuple[str, ...]:

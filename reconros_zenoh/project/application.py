@@ -15,9 +15,8 @@ from reconros_zenoh.board.os_resources import Condition, Mailbox, Mutex, Semapho
 from reconros_zenoh.board.stack_node import StackNode
 from reconros_zenoh.errors import UsageError
 from reconros_zenoh.executor.callbacks import CallbackKind
-from reconros_zenoh.project.communication import topic_name
+from reconros_zenoh.project.communication import gateway_pair, topic_name
 from reconros_zenoh.rmw.parameters import Parameters
-from reconros_zenoh.ros.names import resolve
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -260,13 +259,10 @@ class Application:
         self.executor = executor or self._mapped
         if self.executor is None:
             raise UsageError("app.spin() without a callback. Call app.register(...) first.")
-        for gateway in self.project.configuration.gateways:
-            self.board.add_gateway(
-                gateway.name,
-                resolve(gateway.hw_topic, "/", gateway.name),
-                resolve(gateway.sw_topic, "/", gateway.name),
-                self.types.message(gateway.type),
-            )
+        configuration = self.project.configuration
+        for gateway in configuration.gateways:
+            pair = gateway_pair(configuration.path, gateway)
+            self.board.add_gateway(gateway.name, pair.hmt, pair.smt, self.types.message(gateway.type))
         self.executor.spin()
 
     def close(self) -> None:
@@ -311,7 +307,8 @@ class Application:
 
     def _hardware_topic(self, resource: Resource) -> HardwareTopic:
         return self.board.hardware_topic(
-            topic_name(resource), self.types.message(_required(resource.interface))
+            topic_name(self.project.configuration.path, resource),
+            self.types.message(_required(resource.interface)),
         )
 
     def _node(self, resource: Resource) -> Node:

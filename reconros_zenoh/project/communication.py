@@ -6,26 +6,39 @@ from collections import defaultdict
 from itertools import product
 from typing import TYPE_CHECKING
 
-from reconros_zenoh.errors import FileError
+from reconros_zenoh.errors import FileError, UsageError
 from reconros_zenoh.gateway.filters import Pair, conflict
 from reconros_zenoh.ros.names import resolve
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
+    from pathlib import Path
 
-    from reconros_zenoh.project.build_cfg import BuildConfiguration
+    from reconros_zenoh.project.build_cfg import BuildConfiguration, RosGateway
     from reconros_zenoh.project.mapping_file import CallbackMapping
     from reconros_zenoh.project.resource_groups import Resource
 
 _ENDS = {"rossub": "subscriber", "rospub": "publisher"}
 
 
-def topic_name(resource: Resource) -> str:
-    """Return the absolute name of the topic that a rossub or rospub belongs to."""
+def topic_name(path: Path, resource: Resource) -> str:
+    """Return the absolute name of the topic that a rossub or rospub of the project file `path` belongs to.
+
+    Raise FileError for a name that ROS 2 does not allow.
+    """
     assert resource.node is not None
     assert resource.ros_name is not None
     namespace, _, node = resource.node.rpartition("/")
-    return resolve(resource.ros_name, namespace or "/", node)
+    return _resolved(path, resource.line, resource.ros_name, namespace or "/", node)
+
+
+def gateway_pair(path: Path, gateway: RosGateway) -> Pair:
+    """Return the absolute names of the topics of a gateway; raise FileError as `topic_name`."""
+    hmt, smt = (
+        _resolved(path, gateway.line, topic, "/", gateway.name)
+        for topic in (gateway.hw_topic, gateway.sw_topic)
+    )
+    return Pair(hmt, smt)
 
 
 def check_topics(configuration: BuildConfiguration) -> None:
@@ -34,12 +47,10 @@ def check_topics(configuration: BuildConfiguration) -> None:
     software: defaultdict[str, list[Resource]] = defaultdict(list)
     for resource in configuration.resources:
         if resource.type in _ENDS:
-            (hardware if resource.hardware_mapped else software)[topic_name(resource)].append(resource)
-    _check_gateways(configuration, hardware, software)
-    bridged = {
-        resolve(gateway.hw_topic, "/", gateway.name): resolve(gateway.sw_topic, "/", gateway.name)
-        for gateway in configuration.gateways
-    }
+            topic = topic_name(configuration.path, resource)
+            (hardware if resource.hardware_mapped else software)[topic].append(resource)
+    pairs = _checked_gateways(configuration, hardware, software)
+    bridged = {pair.hmt: pair.smt for pair in pairs}
     for topic, ends in hardware.items():
         _check_ends(configuration, topic, ends)
         for end in software[topic]:
@@ -102,16 +113,22 @@ def _check_ends(configuration: BuildConfiguration, topic: str, ends: list[Resour
             )
 
 
-def _check_gateways(
+def _resolved(path: Path, line: int, topic: str, namespace: str, node: str) -> str:
+    try:
+        return resolve(topic, namespace, node)
+    except UsageError as error:
+        raise FileError(path, line, str(error)) from None
+
+
+def _checked_gateways(
     configuration: BuildConfiguration,
     hardware: Mapping[str, list[Resource]],
     software: Mapping[str, list[Resource]],
-) -> None:
+) -> list[Pair]:
+    """Return the topics of all gateways."""
     pairs: list[Pair] = []
     for gateway in configuration.gateways:
-        pair = Pair(
-            resolve(gateway.hw_topic, "/", gateway.name), resolve(gateway.sw_topic, "/", gateway.name)
-        )
+        pair = gateway_pair(configuration.path, gateway)
         taken = conflict(pair, pairs)
         if taken is not None:
             raise FileError(
@@ -130,3 +147,4 @@ def _check_gateways(
                     f"{end.line} has {end.interface}.",
                     "Write the type of the topics.",
                 )
+    return pairs

@@ -73,6 +73,21 @@ SW = 'sw = rossub, node, image, "/a"\n'
             10,
             "The FIFO of s holds messages of 999 bytes, but p (line 9) publishes up to 1000",
         ),
+        "name that ROS 2 does not allow": (
+            'sw = rossub, node, image, "/1a"\n',
+            9,
+            "'/1a' has a part that begins with a digit",
+        ),
+        "gateway to such a name": (
+            HW + GATEWAY.format("g", "/a", "/1b", "sensor_msgs/Image"),
+            10,
+            "'/1b' has a part that begins with a digit",
+        ),
+        "gateway whose name no node can have": (
+            HW + GATEWAY.format("a-b", "/a", "/b", "sensor_msgs/Image"),
+            10,
+            "The node name 'a-b'",
+        ),
         "two types": (
             HW + 'p = rospub, node, std_msgs/UInt32, "/a", hw\n',
             10,
