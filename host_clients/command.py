@@ -6,10 +6,8 @@ import json
 from contextlib import nullcontext
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from host_clients.daemon import run_client
-from reconros_zenoh.measure.record import RecordWriter
+from reconros_zenoh.measure.record import Record, RecordWriter
 from reconros_zenoh.measure.statistics import format_ms, summarise
 
 if TYPE_CHECKING:
@@ -33,18 +31,16 @@ def make_round_trips(options: ClientOptions, out: Path | None, *, as_json: bool)
                 writer.write(round_trip)
 
         complete = run_client(options, record)
-    times_ms = np.array([trip.time_ns / 1e6 for trip in round_trips if trip.time_ns is not None])
-    lost = sum(trip.outcome == "lost" for trip in round_trips)
-    wrong = sum(trip.outcome == "wrong" for trip in round_trips)
-    summary = summarise(times_ms, lost, wrong)
+    made = Record.of(options.name, round_trips)
+    summary = summarise(made.values_ms, made.lost, made.wrong)
     if as_json:
         print(json.dumps({"client": options.name, "requests": options.requests, **summary}))
     else:
         print(
-            f"{options.name}: {summary['n']} answers, {lost} lost, {wrong} wrong, "
+            f"{options.name}: {summary['n']} answers, {made.lost} lost, {made.wrong} wrong, "
             f"median {format_ms(summary['median_ms'])} ms, p99 {format_ms(summary['p99_ms'])} ms",
             flush=True,
         )
     if not complete:
         return 130
-    return 1 if lost or wrong else 0
+    return 1 if made.lost or made.wrong else 0

@@ -5,11 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from reconros_zenoh.errors import UsageError
 from reconros_zenoh.experiments.simulation import Simulation
-from reconros_zenoh.measure.record import RecordWriter
+from reconros_zenoh.measure.record import Record, RecordWriter
 from reconros_zenoh.measure.statistics import summarise
 from reconros_zenoh.ros.types import TypeRegistry
 
@@ -155,7 +153,7 @@ class DeploymentRun:
     def summaries(self) -> dict[str, dict[str, dict[str, Any]]]:
         """Return what `summarise` says of each client, by board and service."""
         return {
-            board: {service: _summary(trips) for service, trips in services.items()}
+            board: {service: _summary(service, trips) for service, trips in services.items()}
             for board, services in self.round_trips.items()
         }
 
@@ -170,7 +168,6 @@ def prepare(folder: Path) -> None:
         ) from None
 
 
-def _summary(trips: Sequence[RoundTrip]) -> dict[str, Any]:
-    times_ms = np.array([trip.time_ns / 1e6 for trip in trips if trip.time_ns is not None])
-    lost = sum(trip.outcome == "lost" for trip in trips)
-    return summarise(times_ms, lost, sum(trip.outcome == "wrong" for trip in trips))
+def _summary(service: str, trips: Sequence[RoundTrip]) -> dict[str, Any]:
+    record = Record.of(service, trips)
+    return summarise(record.values_ms, record.lost, record.wrong)

@@ -12,14 +12,11 @@ from typing import TYPE_CHECKING, NamedTuple, Self
 
 import numpy as np
 
-from board_daemon.hosting import BoardOptions
-from host_clients.daemon import ClientOptions
 from reconros_zenoh.board.profile import Profile
 from reconros_zenoh.errors import ExperimentError
-from reconros_zenoh.experiments.roundtrip import ANSWER_LIMIT_S, CLIENTS, application_folder
-from reconros_zenoh.experiments.simulation import Simulation
+from reconros_zenoh.experiments.roundtrip import CLIENTS
+from reconros_zenoh.experiments.virtual import run_mapping
 from reconros_zenoh.measure.record import Record
-from reconros_zenoh.project.loader import load_project
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -110,33 +107,6 @@ def _end_with_parent() -> None:
 
 def records_of(run: Run) -> dict[str, Record]:
     """Return the record of each client after one run, made here and now."""
-    project = load_project(application_folder())
     round_trips: dict[str, list[RoundTrip]] = {client: [] for client in CLIENTS}
-    with Simulation(project.types()) as simulation:
-        simulation.add_board(
-            run.profile, project, project.mapping(str(run.mapping)), BoardOptions(seed=run.seed)
-        )
-        for client in CLIENTS:
-            options = ClientOptions(
-                client,
-                "",
-                run.requests,
-                limit_s=ANSWER_LIMIT_S,
-                seed=run.seed,
-                group="roundtrip",
-                members=len(CLIENTS),
-            )
-            simulation.add_client(options, round_trips[client].append)
-        simulation.run()
-    return {client: _record(client, made) for client, made in round_trips.items()}
-
-
-def _record(client: str, round_trips: list[RoundTrip]) -> Record:
-    times_ns = [made.time_ns for made in round_trips if made.time_ns is not None]
-    wrong = sum(made.outcome == "wrong" for made in round_trips)
-    return Record(
-        client,
-        np.array(times_ns, dtype=np.float64) / 1e6,
-        lost=len(round_trips) - len(times_ns),
-        wrong=wrong,
-    )
+    run_mapping(*run, lambda client, round_trip: round_trips[client].append(round_trip))
+    return {client: Record.of(client, made) for client, made in round_trips.items()}

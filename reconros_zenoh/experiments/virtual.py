@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from contextlib import ExitStack
-from typing import TYPE_CHECKING
+from functools import partial
+from typing import TYPE_CHECKING, Any
 
 from board_daemon.hosting import BoardOptions
 from host_clients.daemon import ClientOptions
@@ -15,45 +16,60 @@ from reconros_zenoh.measure.record import RecordWriter
 from reconros_zenoh.project.loader import load_project
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Mapping
+    from pathlib import Path
 
+    from reconros_zenoh.board.profile import Profile
     from reconros_zenoh.experiments.roundtrip import Plan
     from reconros_zenoh.measure.record import RoundTrip
 
 
 def run_virtual(plan: Plan, report: BoardReport, on_progress: Callable[[str, str], None]) -> None:
     """Record the round trips of each mapping; `on_progress(mapping, client)` is called after each of them."""
-    for name in plan.mappings:
-        _run_mapping(plan, name, report, on_progress)
+    profile = read_profile(plan.profile)
+    for mapping, path in plan.mappings.items():
+        with ExitStack() as files:
+            writers = {
+                client: files.enter_context(RecordWriter(plan.record_path(mapping, client)))
+                for client in CLIENTS
+            }
+            record = partial(_record, writers, partial(on_progress, mapping))
+            report.statuses[mapping] = run_mapping(profile, path, plan.requests, plan.seed, record)
 
 
-def _run_mapping(
-    plan: Plan, mapping: str, report: BoardReport, on_progress: Callable[[str, str], None]
-) -> None:
+def run_mapping(
+    profile: Profile,
+    mapping: Path,
+    requests: int,
+    seed: int,
+    on_round_trip: Callable[[str, RoundTrip], None],
+) -> dict[str, Any]:
+    """Let the five clients make their round trips with a board under a mapping file; return its last status.
+
+    `on_round_trip` gets the client's name with each.
+    """
     project = load_project(application_folder())
-    with Simulation(project.types()) as simulation, ExitStack() as files:
+    with Simulation(project.types()) as simulation:
         hosted = simulation.add_board(
-            read_profile(plan.profile),
-            project,
-            project.mapping(str(plan.mappings[mapping])),
-            BoardOptions(seed=plan.seed),
+            profile, project, project.mapping(str(mapping)), BoardOptions(seed=seed)
         )
         for client in CLIENTS:
-            writer = files.enter_context(RecordWriter(plan.record_path(mapping, client)))
-
-            def record(round_trip: RoundTrip, client: str = client, writer: RecordWriter = writer) -> None:
-                writer.write(round_trip)
-                on_progress(mapping, client)
-
             options = ClientOptions(
                 client,
                 "",
-                plan.requests,
+                requests,
                 limit_s=ANSWER_LIMIT_S,
-                seed=plan.seed,
+                seed=seed,
                 group="roundtrip",
                 members=len(CLIENTS),
             )
-            simulation.add_client(options, record)
+            simulation.add_client(options, partial(on_round_trip, client))
         simulation.run()
-        report.statuses[mapping] = status(hosted.board, hosted.executor)
+        return status(hosted.board, hosted.executor)
+
+
+def _record(
+    writers: Mapping[str, RecordWriter], on_progress: Callable[[str], None], client: str, trip: RoundTrip
+) -> None:
+    writers[client].write(trip)
+    on_progress(client)

@@ -46,6 +46,17 @@ class Record:
     lost: int = 0
     wrong: int = 0
 
+    @classmethod
+    def of(cls, name: str, round_trips: Sequence[RoundTrip]) -> Self:
+        """Return the record of these round trips."""
+        times_ns = [trip.time_ns for trip in round_trips if trip.time_ns is not None]
+        return cls(
+            name,
+            np.array(times_ns, dtype=np.float64) / 1e6,
+            lost=len(round_trips) - len(times_ns),
+            wrong=sum(trip.outcome == "wrong" for trip in round_trips),
+        )
+
 
 class RecordWriter:
     """A record file that grows by one line per round trip; each line is on disk before `write` returns.
