@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import signal
 from typing import TYPE_CHECKING, Any
 
 from board_daemon.hosting import HostedBoard
 from reconros_zenoh.board.control import ControlServer, claim_name, status
 from reconros_zenoh.board.gateway_control import GatewayServer
 from reconros_zenoh.clock.virtual import succeed_once
-from reconros_zenoh.clock.wall import WallEnvironment, keep_time
+from reconros_zenoh.clock.wall import WallEnvironment, ending_event, keep_time
 from reconros_zenoh.transport.memory import tune_memory
 from reconros_zenoh.transport.zenoh import ZenohTransport
 
@@ -39,9 +38,7 @@ def run_board(
     keep_time()
     tune_memory()
     environment = WallEnvironment()
-    stop = environment.event()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: environment.post(succeed_once, stop))
+    stop = ending_event(environment)
     with ZenohTransport.open(router) as transport:
         claim_name(transport, options.name)
         hosted = HostedBoard(environment, transport, profile, project, mapping, options)

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import signal
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from host_clients.closed_loop import ClosedLoop
 from host_clients.suite import exchange
 from reconros_zenoh.clock.virtual import succeed_once
-from reconros_zenoh.clock.wall import WallEnvironment, keep_time
+from reconros_zenoh.clock.wall import WallEnvironment, ending_event, keep_time
 from reconros_zenoh.errors import TransportError
 from reconros_zenoh.rmw.node import Context
 from reconros_zenoh.ros.types import TypeRegistry
@@ -51,9 +50,7 @@ def run_client(options: ClientOptions, on_round_trip: Callable[[RoundTrip], None
     keep_time()
     tune_memory()
     environment = WallEnvironment()
-    stop = environment.event()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: environment.post(succeed_once, stop))
+    stop = ending_event(environment)
     with ZenohTransport.open(options.router) as transport:
         node = Context(transport, options.domain).node(f"{options.name}_client")
         start = environment.event()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import signal
 from contextlib import ExitStack
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -13,8 +12,7 @@ from host_clients.gallery import Gallery
 from host_clients.picture_server import PictureServer
 from host_clients.scope import Scope
 from host_clients.viewer import Viewer
-from reconros_zenoh.clock.virtual import succeed_once
-from reconros_zenoh.clock.wall import WallEnvironment, keep_time
+from reconros_zenoh.clock.wall import WallEnvironment, ending_event, keep_time
 from reconros_zenoh.measure.record import RecordWriter
 from reconros_zenoh.rmw.node import Context
 from reconros_zenoh.ros.types import TypeRegistry
@@ -118,7 +116,4 @@ def _begin() -> tuple[WallEnvironment, simpy.Event]:
     keep_time()
     tune_memory()
     environment = WallEnvironment()
-    stop = environment.event()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: environment.post(succeed_once, stop))
-    return environment, stop
+    return environment, ending_event(environment)

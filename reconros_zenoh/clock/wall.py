@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import signal
 import sys
 import threading
 import time
@@ -13,7 +14,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from reconros_zenoh.clock.virtual import VirtualEnvironment
+from reconros_zenoh.clock.virtual import VirtualEnvironment, succeed_once
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -162,3 +163,14 @@ def keep_time() -> None:
     sys.setswitchinterval(0.00005)
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PR_SET_TIMERSLACK, 1, 0, 0, 0)
+
+
+def ending_event(environment: WallEnvironment) -> simpy.Event:
+    """Return an event that SIGINT and SIGTERM make happen from now on, instead of anything else.
+
+    For processes that run until they are told to end; called by the main thread.
+    """
+    ending = environment.event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: environment.post(succeed_once, ending))
+    return ending
