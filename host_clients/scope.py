@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections import deque
 from typing import TYPE_CHECKING, NamedTuple
 
-from reconros_zenoh.applications.roundtrip.kernels.inverse import LEGS, inverse_kinematics
-from reconros_zenoh.errors import BadMessageError
+from reconros_zenoh.applications.roundtrip.callbacks.checks import check_leg
+from reconros_zenoh.applications.roundtrip.kernels.inverse import inverse_kinematics
 from reconros_zenoh.measure.record import RoundTrip
 
 if TYPE_CHECKING:
     from collections.abc import Callable
-    from typing import Any
 
     from reconros_zenoh.clock.virtual import VirtualEnvironment
     from reconros_zenoh.rmw.node import Context
@@ -46,7 +45,7 @@ class Scope:
         self._early: deque[tuple[int, int]] = deque()
         self._node = context.node("scope")
         word = types.message("std_msgs/msg/UInt32")
-        self._node.subscription(word, "/ctrl_out", self._on_ctrl_out, check=_check)
+        self._node.subscription(word, "/ctrl_out", self._on_ctrl_out, check=check_leg)
         self._node.subscription(word, "/tf_out", self._on_tf_out)
 
     def close(self) -> None:
@@ -95,9 +94,3 @@ class _Command(NamedTuple):
 
     def asks_for(self, word: int, sent_ns: int) -> bool:
         return self.expected == word and self.sent_ns <= sent_ns
-
-
-def _check(message: Any) -> None:
-    leg = message.data & 0x7
-    if leg >= LEGS:
-        raise BadMessageError("leg", f"leg {leg} was asked for, the platform has 0 to {LEGS - 1}")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from reconros_zenoh.applications.design_example.picture import FRAMES, moving_picture
-from reconros_zenoh.applications.roundtrip.callbacks.sobel import check_image
+from reconros_zenoh.applications.roundtrip.callbacks.checks import check_image
 from reconros_zenoh.applications.roundtrip.kernels.sobel import SHAPE, sobel
 from reconros_zenoh.errors import BadMessageError
 from reconros_zenoh.measure.record import RoundTrip

@@ -6,10 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from reconros_zenoh.applications.roundtrip.callbacks.sobel import check_image
-from reconros_zenoh.applications.roundtrip.kernels.inverse import LEGS, inverse_kinematics
+from reconros_zenoh.applications.roundtrip.callbacks.checks import check_image, check_leg
+from reconros_zenoh.applications.roundtrip.kernels.inverse import inverse_kinematics
 from reconros_zenoh.applications.roundtrip.kernels.sobel import SHAPE, sobel
-from reconros_zenoh.errors import BadMessageError
 
 if TYPE_CHECKING:
     from collections.abc import Generator
@@ -57,9 +56,7 @@ class InvKinematics:
 
     def check(self, message: Any) -> None:
         """Raise BadMessageError for a leg that the platform does not have."""
-        leg = message.data & 0x7
-        if leg >= LEGS:
-            raise BadMessageError("leg", f"leg {leg} was asked for, the platform has 0 to {LEGS - 1}")
+        check_leg(message)
 
     def hardware(self, thread: HardwareThread) -> Generator[Awaitable, object, None]:
         """Publish the servo index (Listing 3)."""

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from reconros_zenoh.applications.roundtrip.kernels.inverse import LEGS, inverse_kinematics
-from reconros_zenoh.errors import BadMessageError
+from reconros_zenoh.applications.roundtrip.callbacks.checks import check_leg
+from reconros_zenoh.applications.roundtrip.kernels.inverse import inverse_kinematics
 
 if TYPE_CHECKING:
     from collections.abc import Generator
@@ -26,9 +26,7 @@ class Inverse:
 
     def check(self, message: Any) -> None:
         """Raise BadMessageError for a leg that the platform does not have."""
-        leg = message.data & 0x7
-        if leg >= LEGS:
-            raise BadMessageError("leg", f"leg {leg} was asked for, the platform has 0 to {LEGS - 1}")
+        check_leg(message)
 
     def software(self, message: Any, context: SoftwareContext) -> None:
         """Publish the servo index."""

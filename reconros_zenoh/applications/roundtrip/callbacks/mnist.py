@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from reconros_zenoh.applications.roundtrip.callbacks.sobel import check_image
+from reconros_zenoh.applications.roundtrip.callbacks.checks import check_image
 from reconros_zenoh.applications.roundtrip.kernels.mnist import SIDE, shipped_classifier
 
 if TYPE_CHECKING:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from reconros_zenoh.applications.roundtrip.callbacks.checks import check_image
 from reconros_zenoh.applications.roundtrip.kernels.sobel import SHAPE, sobel
-from reconros_zenoh.errors import BadMessageError
 
 if TYPE_CHECKING:
     from collections.abc import Generator
@@ -53,17 +53,4 @@ class Sobel:
             is_bigendian=0,
             step=WIDTH * CHANNELS,
             data=edges.reshape(-1),
-        )
-
-
-def check_image(message: Any, encoding: str, height: int, width: int, channels: int) -> None:
-    """Raise BadMessageError unless the image has this encoding and size, without padding between its rows."""
-    if message.encoding != encoding:
-        raise BadMessageError("image_encoding", f"the image is {message.encoding!r}, not {encoding!r}")
-    size = (message.height, message.width, message.step, len(message.data))
-    if size != (height, width, width * channels, height * width * channels):
-        raise BadMessageError(
-            "image_size",
-            f"the image has height {size[0]}, width {size[1]}, step {size[2]} and {size[3]} bytes, not "
-            f"{height}, {width}, {width * channels} and {height * width * channels}",
         )
