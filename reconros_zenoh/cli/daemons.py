@@ -18,7 +18,9 @@ from reconros_zenoh.cli.options import (
     Bitstreams,
     BoardName,
     Domain,
+    Group,
     MappingName,
+    Members,
     ModelSeed,
     Router,
 )
@@ -108,10 +110,8 @@ def client(
         Path | None, typer.Option(metavar="FILE", help="Record each round trip there.", show_default=False)
     ] = None,
     seed: Annotated[int, typer.Option(help="Seed of the requests.")] = 0,
-    group: Annotated[
-        str | None, typer.Option(help="Begin together with the others of this group.", show_default=False)
-    ] = None,
-    members: Annotated[int, typer.Option(min=1, help="How many clients the group has.")] = 1,
+    group: Group = None,
+    members: Members = 1,
     as_json: AsJson = False,
 ) -> None:
     """Make round trips to a board, one after the other, and check every answer."""

@@ -7,16 +7,12 @@ from typing import Annotated
 
 import typer
 
-from reconros_zenoh.cli.options import ENDPOINT, Domain, Router
+from reconros_zenoh.cli.options import ENDPOINT, Domain, Group, Members, Router
 
 Rate = Annotated[
     float,
     typer.Option(min=0.1, max=1000, metavar="HZ", help="How many pictures per second the camera takes."),
 ]
-Group = Annotated[
-    str | None, typer.Option(help="Begin together with the others of this group.", show_default=False)
-]
-Members = Annotated[int, typer.Option(min=1, help="How many the group has.")]
 
 
 def camera(

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from reconros_zenoh.cli.options import AsJson, Domain, Router
+from reconros_zenoh.cli.options import ENDPOINT, AsJson, Domain, Router
 from reconros_zenoh.errors import UsageError
 from reconros_zenoh.transport.zenoh import ZenohTransport
 
@@ -34,7 +34,7 @@ def gateway(
     name: Annotated[
         str | None, typer.Option(help="The name of its node.", show_default="after the topic")
     ] = None,
-    router: Router = "tcp/127.0.0.1:7447",
+    router: Router = ENDPOINT,
     domain: Domain = 0,
     as_json: AsJson = False,
 ) -> None:

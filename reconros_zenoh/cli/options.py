@@ -14,6 +14,10 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
 
+ENDPOINT = "tcp/127.0.0.1:7447"
+"""Where rmw_zenoh's router listens, and ours."""
+
+
 class ClockName(StrEnum):
     """The two clocks."""
 
@@ -26,7 +30,6 @@ Profile = Annotated[
 ]
 Out = Annotated[Path, typer.Option(metavar="DIR", help="Folder for the records.")]
 Seed = Annotated[int, typer.Option(help="Seed of requests and model.")]
-ENDPOINT = "tcp/127.0.0.1:7447"
 Router = Annotated[
     str, typer.Option(metavar="ENDPOINT", envvar="RECONROS_ROUTER", help="The Zenoh router to connect to.")
 ]
@@ -41,6 +44,10 @@ MappingName = Annotated[
 ]
 BoardName = Annotated[str, typer.Option(help="The board's name in the network.")]
 ModelSeed = Annotated[int, typer.Option(help="Seed of what is random in the model.")]
+Group = Annotated[
+    str | None, typer.Option(help="Begin together with the others of this group.", show_default=False)
+]
+Members = Annotated[int, typer.Option(min=1, help="How many members the group has.")]
 Bitstreams = Annotated[
     Path | None,
     typer.Option(help="Folder of `reconros build`.", show_default="bitstreams held in memory"),

@@ -12,14 +12,13 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from reconros_zenoh.cli.options import ClockName, Profile
+from reconros_zenoh.cli.options import AsJson, ClockName, Profile
 from reconros_zenoh.cli.progress import run_bar
 from reconros_zenoh.measure.statistics import format_error, format_ms, format_share
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
-AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
 Clock = Annotated[ClockName, typer.Option(help="Real time on this host, or virtual time.")]
 
 _MARKS = {"published": "", "calibrated": "c", "assumed": "a"}

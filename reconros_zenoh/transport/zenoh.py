@@ -46,7 +46,7 @@ class ZenohRouter(Closing):
         self._session = session
 
     @classmethod
-    def open(cls, listen: str = "tcp/127.0.0.1:7447") -> Self:
+    def open(cls, listen: str) -> Self:
         """Return a router that accepts sessions on `listen`.
 
         Raises TransportError when it cannot listen there, UsageError when `listen` is not an endpoint.
@@ -78,7 +78,7 @@ class ZenohTransport(Closing):
         self.frames = Frames(_open_pool)
 
     @classmethod
-    def open(cls, router: str = "tcp/127.0.0.1:7447", *, timeout_s: float = 3.0) -> Self:
+    def open(cls, router: str, *, timeout_s: float = 3.0) -> Self:
         """Return a session that is connected to `router`, for which it waits at most `timeout_s`.
 
         Raises TransportError when no router answers, UsageError when `router` is not an endpoint.
