@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from decimal import Decimal
 from enum import StrEnum
 from graphlib import CycleError, TopologicalSorter
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from reconros_zenoh.yaml_node import Node
 
@@ -64,14 +64,10 @@ class Service:
 
 @dataclass(frozen=True, slots=True)
 class Deployment:
-    """The services of a Compose file, in the order of the file.
-
-    `x_reconros` is the block of that name as it stands in the file: variables are not replaced in it.
-    """
+    """The services of a Compose file, in the order of the file."""
 
     path: Path
     services: dict[str, Service]
-    x_reconros: dict[str, Any]
 
 
 def read_compose(path: Path, environment: Mapping[str, str]) -> Deployment:
@@ -90,10 +86,7 @@ def read_compose(path: Path, environment: Mapping[str, str]) -> Deployment:
     for node in nodes.values():
         _check_dependencies(node, services)
     _check_no_cycle(services, nodes)
-    block = entries.get("x-reconros")
-    if block is not None:
-        block.mapping()
-    return Deployment(path, services, {} if block is None else block.value)
+    return Deployment(path, services)
 
 
 def duration_ns(text: str) -> int | None:

@@ -130,21 +130,13 @@ def spans_figure(spans: Mapping[str, Mapping[str, Mapping[str, float]]]) -> Figu
     return figure
 
 
-def write_grid(path: Path, records: Mapping[str, Mapping[str, Record]]) -> None:
-    """Write the grid of `grid_figure` to a `.png` or `.svg` file.
-
-    Raises UsageError for another suffix, if the file cannot be written, or if there is no record.
-    """
-    if not any(records.values()):
-        raise UsageError(f"{path}: there is no record to draw. Run the experiment first.")
-    _save(grid_figure(records), path, ("png", "svg"))
-
-
 def write_histograms(path: Path, pairs: Sequence[tuple[NamedRecord, NamedRecord | None]], bins: int) -> None:
     """Write a `.png` file with one histogram per record, the distribution to compare with behind it in grey.
 
     The same bins as in the terminal. Raises UsageError for another suffix or if the file cannot be written.
     """
+    if path.suffix.lower() != ".png":
+        raise UsageError(f"{path}: histograms are written as png. Name the file *.png.")
     from matplotlib.figure import Figure  # noqa: PLC0415  see the module docstring
 
     columns = min(len(pairs), 3)
@@ -165,7 +157,14 @@ def write_histograms(path: Path, pairs: Sequence[tuple[NamedRecord, NamedRecord 
         figure.supxlabel("round-trip time [ms]; above each panel its median")
         figure.supylabel("relative frequency")
         _legend(figure, "record", "compared with" if any(other for _, other in pairs) else None)
-    _save(figure, path, ("png",))
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with _style():
+            figure.savefig(path, dpi=130)
+    except OSError as error:
+        raise UsageError(
+            f"{path}: the drawing cannot be written: {error.strerror}. Choose a folder that you may write to."
+        ) from error
 
 
 def draw_histogram(axes: Axes, record: Record, edges_ms: npt.NDArray[np.float64], title: str) -> None:
@@ -191,22 +190,6 @@ def inline_svg(figure: Figure) -> str:
     svg = re.sub(r' xmlns(:xlink)?="[^"]*"', "", svg).replace("xlink:href", "href")
     svg = re.sub(r' width="[^"]*pt" height="[^"]*pt"|height="[^"]*pt" ', "", svg, count=1)
     return svg.replace(INK, "var(--ink)").replace(GREY, "var(--grey)")
-
-
-def _save(figure: Figure, path: Path, formats: Sequence[str]) -> None:
-    suffix = path.suffix.lower().removeprefix(".")
-    if suffix not in formats:
-        raise UsageError(
-            f"{path}: drawings are written as {' or '.join(formats)}. Name the file *.{formats[0]}."
-        )
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with _style():
-            figure.savefig(path, format=suffix, dpi=130)
-    except OSError as error:
-        raise UsageError(
-            f"{path}: the drawing cannot be written: {error.strerror}. Choose a folder that you may write to."
-        ) from error
 
 
 def _style() -> AbstractContextManager[None]:

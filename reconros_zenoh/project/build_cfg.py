@@ -89,7 +89,7 @@ class ReconosThread:
 class RosGateway:
     """A gateway between a hardware-mapped and a software-mapped topic, and the ids of the slots it sits in.
 
-    `type` is the ROS 2 name of the message type, `written_type` the one the file holds.
+    `type` is the ROS 2 name of the message type.
     """
 
     name: str
@@ -97,7 +97,6 @@ class RosGateway:
     hw_topic: str
     sw_topic: str
     type: str
-    written_type: str
     line: int
 
 
@@ -286,6 +285,5 @@ def _gateway(name: str, section: Section, slots: Collection[HwSlot], warnings: l
         hw_topic=hw_topic.value.strip('"'),
         sw_topic=sw_topic.value.strip('"'),
         type=message_type,
-        written_type=written.value,
         line=section.line,
     )

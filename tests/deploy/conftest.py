@@ -48,7 +48,7 @@ class Services:
         return Healthcheck(("test", "-e", str(self.folder / name)), OFTEN_NS, retries=PATIENT)
 
     def deployment(self, *services: Service) -> Deployment:
-        return Deployment(self.folder / "compose.yaml", {service.name: service for service in services}, {})
+        return Deployment(self.folder / "compose.yaml", {service.name: service for service in services})
 
     def compose_file(self, *services: Service) -> Path:
         """Write the services as a Compose file."""

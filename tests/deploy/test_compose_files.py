@@ -23,8 +23,7 @@ SHIPPED = Path(deploy.__file__).parent
 COMPLETE = """\
 name: demo
 networks: {board: {}}
-x-reconros:
-  profile: zynq7100
+x-notes:
   note: $not replaced
 services:
   router:
@@ -104,7 +103,6 @@ def test_everything_that_is_supported(read: Callable[..., Deployment], tmp_path:
                 Healthcheck(("/bin/sh", "-c", "exit 0"), retries=2),
             ),
         },
-        x_reconros={"profile": "zynq7100", "note": "$not replaced"},
     )
 
 
@@ -189,7 +187,6 @@ ERRORS = {
         6,
         "whole number",
     ),
-    "x-reconros: []\nservices: {}": (1, "x-reconros must be a mapping"),
     "x-b: &b\n  image: 5\n  other: 5\nservices:\n  a:\n    <<: *b\n    command: x": (
         5,
         "services.a.other is not",

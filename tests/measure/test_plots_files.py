@@ -13,7 +13,7 @@ from reconros_zenoh.board.spans import Stage
 from reconros_zenoh.errors import UsageError
 from reconros_zenoh.measure import plots
 from reconros_zenoh.measure.histogram import NamedRecord
-from reconros_zenoh.measure.plots import grid_figure, inline_svg, spans_figure, write_grid, write_histograms
+from reconros_zenoh.measure.plots import grid_figure, inline_svg, spans_figure, write_histograms
 from reconros_zenoh.measure.record import Record
 
 PNG = b"\x89PNG\r\n\x1a\n"
@@ -94,32 +94,18 @@ def test_the_inline_drawing_needs_nothing_from_outside(board_records):
     ET.fromstring(svg)
 
 
-def test_grids_are_written_as_png_and_svg(board_records, tmp_path):
-    write_grid(tmp_path / "new" / "grid.png", board_records)
-    assert (tmp_path / "new" / "grid.png").read_bytes().startswith(PNG)
-    write_grid(tmp_path / "grid.svg", board_records)
-    assert ET.parse(tmp_path / "grid.svg").getroot().tag.endswith("svg")
-
-
-def test_drawings_that_cannot_be_written_are_usage_errors(board_records, tmp_path):
-    with pytest.raises(UsageError, match=r"grid\.jpg: drawings are written as png or svg"):
-        write_grid(tmp_path / "grid.jpg", board_records)
-    (tmp_path / "file").write_text("")
-    with pytest.raises(UsageError, match="cannot be written"):
-        write_grid(tmp_path / "file" / "grid.png", {"mine": {"x": Record("x", np.array([1.0]))}})
-    with pytest.raises(UsageError, match="no record to draw"):
-        write_grid(tmp_path / "grid.png", {"mixed": {}})
-
-
 def test_histograms_are_drawn_with_their_comparison(tmp_path):
     ours = NamedRecord("mixed/sort", tmp_path / "a.csv", like_the_board("mixed", "sort"))
     other = NamedRecord("all_hardware/sort", tmp_path / "b.csv", like_the_board("all_hardware", "sort"))
     silent = NamedRecord(f"{LONG}/sort", tmp_path / "c.csv", Record("sort", np.array([]), lost=1))
-    path = tmp_path / "h.png"
+    path = tmp_path / "new" / "h.png"
     write_histograms(path, [(ours, other), (ours, None), (silent, other), (silent, silent)], 20)
     assert path.read_bytes().startswith(PNG)
-    with pytest.raises(UsageError, match="written as png"):
+    with pytest.raises(UsageError, match=r"h\.svg: histograms are written as png"):
         write_histograms(tmp_path / "h.svg", [(ours, None)], 20)
+    (tmp_path / "file").write_text("")
+    with pytest.raises(UsageError, match="cannot be written"):
+        write_histograms(tmp_path / "file" / "h.png", [(ours, None)], 20)
 
 
 def test_measuring_does_not_load_the_drawing_library():
