@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from reconros_zenoh.board.callback import HardwareThread
     from reconros_zenoh.board.software import SoftwareContext
 
-LIMIT_S = 10
+LIMIT_S = 30
 MS = 1_000_000
 
 

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from reconros_zenoh.board.spans import Timeline
 
 
-LIMIT_S = 10
+LIMIT_S = 30
 MS = 1_000_000
 
 

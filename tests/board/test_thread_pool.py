@@ -33,7 +33,7 @@ def test_what_never_ends_is_left_and_what_has_not_begun_never_does(
         end.wait()
 
     running, waiting = pool.submit(endless), pool.submit(int)
-    assert begun.wait(10)
+    assert begun.wait(30)
     pool.close()
     assert "1 computations have not ended" in caplog.text
     with pytest.raises(CancelledError):

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
     from reconros_zenoh.clock.wall import WallEnvironment
 
-LIMIT_S = 20
+LIMIT_S = 30
 """Long after everything here is over; only a test that fails waits that long."""
 
 

@@ -72,12 +72,12 @@ class Services:
     def assert_gone(self) -> None:
         """Fail when this process has a child that it had not before, or a process that left its number lives.
 
-        The latter may be orphans, whose end takes a moment to be noticed: they get 10 s.
+        The latter may be orphans, whose end takes a moment to be noticed: they get 30 s.
         """
         assert set(psutil.Process().children(recursive=True)) <= self._others
         numbers = [int(file.read_text()) for file in self.folder.glob("*.pid")]
         orphans = [psutil.Process(number) for number in numbers if psutil.pid_exists(number)]
-        assert not psutil.wait_procs(orphans, timeout=10)[1]
+        assert not psutil.wait_procs(orphans, timeout=30)[1]
 
 
 @pytest.fixture

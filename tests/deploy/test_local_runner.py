@@ -375,7 +375,7 @@ def test_a_signal_to_the_runner_stops_all(services: Services, number: signal.Sig
         _, errors = process.communicate()
         assert process.returncode == STATUS[number], errors
     assert children
-    assert not psutil.wait_procs(children, timeout=10)[1]
+    assert not psutil.wait_procs(children, timeout=30)[1]
 
 
 def test_a_second_signal_is_not_patient(services: Services) -> None:

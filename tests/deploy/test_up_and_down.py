@@ -196,7 +196,7 @@ def test_down_tells_why_it_had_ended_before(services: Services, run: Run) -> Non
     assert run("up", "-d").returncode == 0
     supervisor = _supervisor(services)
     (services.folder / "pipe").write_bytes(b"go on")
-    supervisor.wait(timeout=10)
+    supervisor.wait(timeout=30)
     down = run("down")
     assert down.stdout.startswith(
         "server: stopped\nclient: failed\nIt had failed before: Service client ended with"

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from http.client import HTTPResponse
 
-LIMIT_S = 20
+LIMIT_S = 30
 GREY, WHITE = (np.full((48, 64, 3), level, np.uint8) for level in (128, 255))
 
 

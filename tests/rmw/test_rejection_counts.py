@@ -68,7 +68,7 @@ def test_the_counts_do_not_change_behind_the_readers_back() -> None:
 
 def test_two_threads_count_together(caplog: pytest.LogCaptureFixture) -> None:
     refused = Rejections()
-    together = Barrier(2, timeout=10)
+    together = Barrier(2, timeout=30)
 
     def add() -> None:
         together.wait()

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import psutil
 import pytest
-from processes import Process, run
+from processes import LIMIT_S, Process, run
 
 from reconros_zenoh.experiments.roundtrip import CLIENTS, application_folder
 
@@ -159,7 +159,7 @@ def in_the_middle(tmp_path: Path) -> Iterator[tuple[Process, list[psutil.Process
         children = psutil.Process(experiment.pid).children(recursive=True)
         yield experiment, children
         # They may take a moment to be noticed as gone.
-        assert not psutil.wait_procs(children, timeout=10)[1]
+        assert not psutil.wait_procs(children, timeout=LIMIT_S)[1]
 
 
 def _commands(children: list[psutil.Process]) -> list[str]:
