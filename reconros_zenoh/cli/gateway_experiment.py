@@ -15,6 +15,7 @@ from rich.table import Table
 from reconros_zenoh.cli.options import AsJson, ClockName, Out, Profile
 from reconros_zenoh.cli.progress import run_bar
 from reconros_zenoh.errors import UsageError
+from reconros_zenoh.experiments.provenance import writing
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -81,15 +82,11 @@ def gateway(
 
 def _prepare(out: Path) -> None:
     """Make the folder before anything is measured, without what an earlier run left."""
-    try:
+    with writing(out):
         out.mkdir(parents=True, exist_ok=True)
         for name in (_RESULT, *_FIGURES.values()):
             (out / name).unlink(missing_ok=True)
         (out / _RESULT).touch()  # who cannot write shall hear of it before he measures
-    except OSError as error:
-        raise UsageError(
-            f"{out} cannot be written ({error.strerror}). Choose another folder with --out."
-        ) from None
 
 
 def _write(out: Path, result: dict[str, Any]) -> list[Path]:

@@ -15,7 +15,7 @@ from reconros_zenoh.board.osif import Osif
 from reconros_zenoh.clock.virtual import VirtualEnvironment
 from reconros_zenoh.clock.wall import WallEnvironment
 from reconros_zenoh.errors import ExperimentError, UsageError
-from reconros_zenoh.experiments.provenance import machine
+from reconros_zenoh.experiments.provenance import host
 from reconros_zenoh.experiments.roundtrip import application_folder
 from reconros_zenoh.project.loader import load_project
 from reconros_zenoh.project.mapping_file import CallbackMapping, Mapping
@@ -106,10 +106,7 @@ def measure_callbacks(
         "callbacks": table,
         "basis_memif": model.memif.bandwidth.basis,
         "basis_calls": model.osif.call.basis,
-        "host": {
-            "machine": machine(),
-            "overruns": overruns,
-        },
+        "host": host(overruns),
     }
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from reconros_zenoh.errors import UsageError
+from reconros_zenoh.experiments.provenance import writing
 from reconros_zenoh.experiments.simulation import Simulation
 from reconros_zenoh.measure.record import Record, RecordWriter
 from reconros_zenoh.measure.statistics import summarise
@@ -160,12 +161,8 @@ class DeploymentRun:
 
 def prepare(folder: Path) -> None:
     """Make the folder of the records; raise UsageError when that fails."""
-    try:
+    with writing(folder):
         folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise UsageError(
-            f"{folder} cannot be written ({error.strerror}). Choose another folder with --out."
-        ) from None
 
 
 def _summary(service: str, trips: Sequence[RoundTrip]) -> dict[str, Any]:

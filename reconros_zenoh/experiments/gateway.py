@@ -16,7 +16,7 @@ from reconros_zenoh.board.spans import Timeline
 from reconros_zenoh.clock.virtual import VirtualEnvironment, succeed_once
 from reconros_zenoh.clock.wall import WallEnvironment
 from reconros_zenoh.errors import ExperimentError, UsageError
-from reconros_zenoh.experiments.provenance import machine
+from reconros_zenoh.experiments.provenance import host
 from reconros_zenoh.project.loader import load_project
 from reconros_zenoh.project.mapping_file import CallbackMapping, Mapping
 from reconros_zenoh.transport.simulated import SimulatedNetwork
@@ -151,14 +151,6 @@ def until_interrupted() -> Iterator[Interruption]:
         interruption.happened = True
 
 
-def host(overruns: int) -> dict[str, Any]:
-    """Return what is known of this host, and how often it was slower than the model."""
-    return {
-        "machine": machine(),
-        "overruns": overruns,
-    }
-
-
 def anchors(cells: Iterable[Cell]) -> list[dict[str, Any]]:
     """Return what the text of Section 4 says, beside the same of these cells; only what they hold.
 
@@ -260,7 +252,7 @@ class _Rounds:
         self._sw_ns: list[int] = []
         self.done = environment.event()
 
-    def open(self, on_ready: Callable[[], None], check: Callable[[Any], None] | None) -> None:  # noqa: ARG002
+    def open(self, on_ready: Callable[[], None], check: Callable[[Any], None] | None) -> None:  # noqa: ARG002 - no message comes
         """Let the first round begin."""
         self._on_ready = on_ready
         self._begin()

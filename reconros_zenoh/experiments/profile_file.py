@@ -13,6 +13,7 @@ from pydantic import ValidationError
 
 from reconros_zenoh.board.profile import Profile, profile_names
 from reconros_zenoh.errors import FileError, UsageError
+from reconros_zenoh.experiments.provenance import writing
 from reconros_zenoh.toml_file import TomlFile
 
 if TYPE_CHECKING:
@@ -58,18 +59,15 @@ def replacing(path: Path) -> Iterator[Path]:
     Raise UsageError at once if `path` cannot be written, so that no work is lost.
     """
     partial = path.with_name(f"{path.name}.partial")
-    try:
+    with writing(path):
         if path.is_dir():
             raise UsageError(f"{path} is a folder. Name the file of the new profile.")
         path.parent.mkdir(parents=True, exist_ok=True)
         partial.touch()
-    except OSError as error:
-        raise UsageError(f"{path} cannot be written ({error.strerror}). Choose another --out.") from None
     try:
-        yield partial
-        partial.replace(path)
-    except OSError as error:
-        raise UsageError(f"{path} cannot be written ({error.strerror}). Choose another --out.") from None
+        with writing(path):
+            yield partial
+            partial.replace(path)
     finally:
         partial.unlink(missing_ok=True)
 

@@ -1,4 +1,4 @@
-"""What an experiment's object says besides its figures: when, where, with what; and its file."""
+"""What an experiment's object says besides its figures: when, where, with what; and where it is written."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import os
 import platform
 import shlex
 import sys
+from contextlib import contextmanager
 from datetime import UTC, datetime
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
@@ -14,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 from reconros_zenoh.errors import UsageError
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterator, Mapping
     from pathlib import Path
 
 
@@ -35,10 +36,22 @@ def provenance() -> dict[str, Any]:
     }
 
 
+def host(overruns: int) -> dict[str, Any]:
+    """Return what is known of this host, and how often it was slower than the model."""
+    return {"machine": machine(), "overruns": overruns}
+
+
+@contextmanager
+def writing(place: Path) -> Iterator[None]:
+    """Run the block, which writes to what --out names; raise UsageError when that fails."""
+    try:
+        yield
+    except OSError as error:
+        raise UsageError(f"{place} cannot be written ({error.strerror}). Choose another --out.") from None
+
+
 def write_experiment(folder: Path, experiment: Mapping[str, Any]) -> None:
     """Write the object as experiment.json; raise UsageError when that fails."""
     path = folder / "experiment.json"
-    try:
+    with writing(path):
         path.write_text(json.dumps(experiment, indent=1), encoding="utf-8")
-    except OSError as error:
-        raise UsageError(f"{path} cannot be written ({error.strerror}). Choose another --out.") from None

@@ -7,8 +7,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from reconros_zenoh.errors import UsageError
-from reconros_zenoh.experiments.provenance import machine, provenance, write_experiment
+from reconros_zenoh.experiments.provenance import host, provenance, write_experiment, writing
 from reconros_zenoh.measure.compare import experiment_tables
 from reconros_zenoh.measure.record import read_record
 
@@ -62,10 +61,9 @@ class BoardReport:
         """Return the overruns of all mappings together and the worst lag."""
         hosts = [status["host"] for status in self.statuses.values()]
         return {
-            "machine": machine(),
-            "overruns": sum(host["overruns"] for host in hosts),
+            **host(sum(each["overruns"] for each in hosts)),
             **{
-                key: max((host[key] for host in hosts if host[key] is not None), default=None)
+                key: max((each[key] for each in hosts if each[key] is not None), default=None)
                 for key in ("lag_p50_us", "lag_p99_us")
             },
         }
@@ -105,16 +103,12 @@ def all_right(experiment: Mapping[str, Any]) -> bool:
 
 def prepare(plan: Plan) -> None:
     """Make the folders of the run, without what an earlier run left; raise UsageError if that fails."""
-    try:
+    with writing(plan.folder):
         for mapping in plan.mappings:
             (plan.folder / mapping).mkdir(parents=True, exist_ok=True)
             for client in CLIENTS:
                 plan.record_path(mapping, client).unlink(missing_ok=True)
         (plan.folder / "experiment.json").unlink(missing_ok=True)
-    except OSError as error:
-        raise UsageError(
-            f"{plan.folder} cannot be written ({error.strerror}). Choose another folder with --out."
-        ) from None
 
 
 def _records(plan: Plan) -> dict[str, dict[str, Record]]:

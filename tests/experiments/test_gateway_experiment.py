@@ -169,7 +169,7 @@ def test_a_folder_that_cannot_be_written_is_refused_before_anything_is_measured(
     (tmp_path / "file").touch()  # not even root can make a folder below it
     result = run("--out", str(tmp_path / "file" / "x"))
     assert isinstance(result.exception, UsageError)
-    assert "Choose another folder with --out" in str(result.exception)
+    assert "Choose another --out" in str(result.exception)
 
 
 def test_the_command_prints_a_table(tmp_path) -> None:

@@ -221,5 +221,5 @@ def test_a_board_that_cannot_host_its_project_is_named(tmp_path: Path) -> None:
 
 def test_a_folder_that_cannot_be_made_is_an_error_before_anything_runs(tmp_path: Path) -> None:
     (tmp_path / "out").touch()
-    with pytest.raises(UsageError, match="Choose another folder with --out"):
+    with pytest.raises(UsageError, match="Choose another --out"):
         run("-f", ROUNDTRIP, "--out", tmp_path / "out")
