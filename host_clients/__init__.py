@@ -1,1 +1,1 @@
-"""The desktop side of the round-trip experiment: one closed-loop client per callback."""
+"""The desktop side of the experiments: a closed-loop client per callback; camera, viewer and scope."""

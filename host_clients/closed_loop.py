@@ -22,10 +22,10 @@ class ClosedLoop:
     """Asks, waits, checks, records, and asks again: N times, then `done`.
 
     First it waits until somebody serves its requests and repeats an unrecorded request until one is answered;
-    `warm` happens then. It goes on once `start` has happened. A round trip is measured on the monotonic
-    clock, from just before the request is sent to the answer's arrival on the transport's thread. A request
-    without answer after `limit_ns` is lost and the loop goes on; should its answer come later, it is left
-    aside.
+    `warm` happens then. It goes on once `start` has happened. A round trip is measured on the environment's
+    clock, from just before the request is sent (where the exchange asks nothing, from the last answer) to the
+    answer's arrival on the transport's thread. A request without answer after `limit_ns` is lost and the loop
+    goes on; should its answer come later, it is left aside.
     """
 
     def __init__(

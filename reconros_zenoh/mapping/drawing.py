@@ -81,7 +81,7 @@ def dot(graph: ComputationGraph, mappings: Mapping[str, TopicMapping]) -> str:
     vertices = [Vertex(name, is_topic=False) for name in graph.nodes]
     vertices += [Vertex(topic.name, is_topic=True) for topic in graph.topics]
     lines = ["digraph mapping {", "  rankdir=LR;", "  subgraph cluster_hardware {"]
-    lines += ['    label="hardware"; style=filled; color="#e3edf7";']
+    lines += [f'    label="hardware"; style=filled; color="{_SHADE}";']
     lines += [f"    {_dot_vertex(v, mappings)}" for v in vertices if in_hardware(graph, mappings, v)]
     lines += ["  }"]
     lines += [f"  {_dot_vertex(v, mappings)}" for v in vertices if not in_hardware(graph, mappings, v)]

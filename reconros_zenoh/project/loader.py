@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from reconros_zenoh.board.bitstream import Bitstream
@@ -19,7 +20,6 @@ from reconros_zenoh.project.text_file import read_text_file
 
 if TYPE_CHECKING:
     from collections.abc import Callable
-    from pathlib import Path
 
     from reconros_zenoh.board.executor import Executor
     from reconros_zenoh.board.profile import Profile
@@ -127,11 +127,10 @@ class Project:
         shipped = self._mappings()
         if name_or_file in shipped:
             return shipped[name_or_file]
-        path = type(self.folder)(name_or_file)
+        path = Path(name_or_file)
         if path.suffix != ".toml":
-            raise UsageError(
-                f"no mapping named {name_or_file!r}. Give one of {', '.join(shipped)} or a .toml file."
-            )
+            known = f"one of {', '.join(shipped)} or " if shipped else ""
+            raise UsageError(f"no mapping named {name_or_file!r}. Give {known}a .toml file.")
         return path
 
     def _mappings(self) -> dict[str, Path]:
