@@ -37,8 +37,8 @@ if TYPE_CHECKING:
 
 _HEARTBEAT_S = 0.5
 
-# One pool instead of a thread per stage nearly halves a round trip; of two threads, closing can have to wait. A
-# socket is watched by the pool that accepted it: with `acc` elsewhere every message wakes a thread there first.
+# One pool instead of a thread per stage nearly halves a round trip; of two threads, closing can have to wait.
+# A socket is watched by the pool that accepted it: were `acc` elsewhere, a message would wake a thread more.
 _THREADS = "(rx: (handover: net), tx: (handover: net), acc: (handover: net), net: (worker_threads: 4))"
 
 _T = TypeVar("_T")
