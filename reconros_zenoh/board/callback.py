@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar, overload
 
 import numpy as np
@@ -14,6 +14,7 @@ from reconros_zenoh.board.host import measured
 from reconros_zenoh.board.timing import cycles_ns
 from reconros_zenoh.errors import PageFaultError
 from reconros_zenoh.ros.c_layout import is_number, number
+from reconros_zenoh.ros.message_arrays import arrays_of, lies_in
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator
@@ -94,11 +95,24 @@ class InitData:
             message_type = message_type.nested(str(dict(message_type.fields)[name][1]))
         form = dict(message_type.fields)[last]
         dtype = number(form) if is_number(form) else None
-        return np.atleast_1d(np.asarray(getattr(message, last), dtype))
+        array = np.atleast_1d(np.asarray(getattr(message, last), dtype))
+        self._arrays.append(array)
+        return array
 
     def in_memory(self) -> Any:
         """Return the message as it stands in memory: with what the callback has written."""
         return self.message if self._placed is None else self._placed.load()
+
+    def holds(self, source: Array | int) -> bool:
+        """Tell whether all of an array, or of the block at an address, belongs to this message."""
+        if not isinstance(source, np.ndarray):
+            return self._placed is not None and self._placed.holds(source)
+        return any(lies_in(source, array) for array in self._arrays)
+
+    @cached_property
+    def _arrays(self) -> list[Array]:
+        """The arrays of the message, and those that were made of its other fields."""
+        return list(arrays_of(self.message))
 
     def release(self) -> None:
         """Take the struct out of memory."""
@@ -168,16 +182,18 @@ class HardwareThread(DelegateCalls):
         """Return the array once it has come from main memory into the slot: MEM_READ.
 
         The source is an array, such as a field of the message, or an address: then `size` bytes from there on
-        come as numbers of `dtype`. What came over a hardware-mapped topic is in the slot already. Raises
-        PageFaultError for bytes that are not all in one block of memory.
+        come as numbers of `dtype`. A message that came over a hardware-mapped topic is in the slot already:
+        its arrays, views of them, and its blocks at their addresses cost nothing, copies and all else do.
+        Raises PageFaultError for bytes that are not all in one block of memory.
         """
         if isinstance(source, np.ndarray):
             data: Array = source
         else:
             assert size is not None
+            source = int(source)
             # What the slot holds does not change with the memory.
-            data = self._mapped(int(source), size).view(dtype).copy()
-        if not self._in_slot:
+            data = self._mapped(source, size).view(dtype).copy()
+        if not (self._in_slot and isinstance(self._message, InitData) and self._message.holds(source)):
             yield from self._board.memif.transfer(data.nbytes)
             self._timeline.mark("memif")
         return data

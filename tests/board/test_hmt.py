@@ -282,3 +282,60 @@ def test_pointers_and_plain_kernels_work_on_a_stream_as_well() -> None:
     assert arrived.take().message.data.tolist() == (2 * body.data).tolist()
     assert board.memif.transferred_bytes == 0
     assert executor.failures == {}
+
+
+def read_bytes(source: Any) -> int:
+    """How much crosses the MEMIF when a callback reads this for a message that came over a stream."""
+
+    def reader(hardware: Any) -> Steps:
+        init = yield from hardware.get_init_data()
+        yield from hardware.mem_read(*source(hardware, init))
+
+    board = small_board(small_profile({"reader": (0, 0)}), slots=1)
+    topic = board.hardware_topic("/in", words)
+    executor = Executor(board, 0, 1)
+    executor.add_hw_callback("reader", [0], CallbackKind.SUB, HmtSource(board, topic, FifoPlan()), reader)
+    executor.spin()
+    body = words.cls(layout=layout, data=WHOLE[:84])
+    start(board.environment, topic.publish("p", body, size_of(body), Timeline(board.environment, 0)))
+    board.environment.run()
+    assert (executor.calls, executor.failures) == ({"reader": 1}, {})
+    return board.memif.transferred_bytes
+
+
+def block_of(hardware: Any, init: Any) -> int:
+    """Where the bytes of `data` stand."""
+    pointer = hardware._board.memory.read(init + hardware.offsetof(words, "data.data"), 4)
+    return int(pointer.view(np.uint32)[0])
+
+
+MESSAGE_READS = {
+    "an array": lambda _, init: (init.data,),
+    "a view of it": lambda _, init: (init.data[10:20:2].reshape(1, 5),),
+    "all of it backwards": lambda _, init: (init.data[::-1],),
+    "a field as an array": lambda _, init: (init.array("data"),),
+    "a number as an array": lambda _, init: (init.array("layout.data_offset"),),
+    "its struct": lambda _, init: (init, 4),
+    "a block of it": lambda hw, init: (block_of(hw, init), 84),
+}
+OTHER_READS = {
+    "a copy of its array": (lambda _, init: (init.data.copy(),), 84),
+    "an array that its array is a part of": (lambda _, __: (WHOLE,), 200),
+    "an array of the program": (lambda _, __: (np.zeros(60, np.uint8),), 60),
+    "other memory": (lambda hw, _: (hw._board.memory.map(np.zeros(50, np.uint8)), 40), 40),
+    "other memory, with its struct placed": (
+        lambda hw, init: (hw._board.memory.map(np.zeros(init.address and 50, np.uint8)) + 8, 40),
+        40,
+    ),
+}
+WHOLE = np.arange(200, dtype=np.uint8)
+
+
+@pytest.mark.parametrize("source", MESSAGE_READS.values(), ids=MESSAGE_READS.keys())
+def test_a_message_of_a_stream_lies_in_the_slot(source: Any) -> None:
+    assert read_bytes(source) == 0
+
+
+@pytest.mark.parametrize(("source", "size"), OTHER_READS.values(), ids=OTHER_READS.keys())
+def test_all_else_has_to_be_read_from_memory(source: Any, size: int) -> None:
+    assert read_bytes(source) == size
