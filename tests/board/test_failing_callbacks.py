@@ -234,7 +234,10 @@ def test_a_callback_in_software_that_wants_to_end_the_board(
     assert executor.failures == {"a": 2}
 
 
-def test_hardware_callbacks_that_are_not_written_as_they_must_be(caplog: pytest.LogCaptureFixture) -> None:
+@pytest.mark.parametrize("limit_ms", [None, 1000.0])
+def test_hardware_callbacks_that_are_not_written_as_they_must_be(
+    limit_ms: float | None, caplog: pytest.LogCaptureFixture
+) -> None:
     def leaves(_: HardwareThread) -> Steps:
         sys.exit(3)
         yield
@@ -245,13 +248,22 @@ def test_hardware_callbacks_that_are_not_written_as_they_must_be(caplog: pytest.
     def waits_for_nothing(_: HardwareThread) -> Any:
         yield
 
-    callbacks = [leaves, forgets_from, waits_for_nothing, lambda _: 5, lambda _: None]
-    for callback in callbacks:
+    callbacks: dict[Callable[[HardwareThread], Any], str] = {
+        leaves: "3",
+        forgets_from: "cannot be waited for. Call what takes time with `yield from`.",
+        waits_for_nothing: "None cannot be waited for. Call what takes time with `yield from`.",
+        lambda _: 5: "a hardware callback is a generator, this one returned 5. Call what takes time",
+        lambda _: None: "a hardware callback is a generator, this one returned None. Call what takes time",
+        lambda _: [7]: "a hardware callback is a generator, this one returned [7]. Call what takes time",
+    }
+    for callback, text in callbacks.items():
+        caplog.clear()
         board = small_board(PROFILE, 1)
         executor, source = Executor(board, 0, 1), Tickets(board)
-        executor.add_hw_callback("a", [0], CallbackKind.SUB, source, callback)
+        executor.add_hw_callback("a", [0], CallbackKind.SUB, source, callback, limit_ms=limit_ms)
         executor.spin()
         source.put(1)
         source.put(2)
         board.environment.run(until=100_000)
         assert executor.failures == {"a": 2}, callback
+        assert text in str(caplog.records[0].exc_info[1])  # type: ignore[index]
