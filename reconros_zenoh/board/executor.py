@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import logging
 import math
-from collections import Counter
+from collections import Counter, defaultdict
 from dataclasses import dataclass, field
 from functools import partial
 from typing import TYPE_CHECKING, Any, Literal
 
 from reconros_zenoh.board.bitstream import Bitstream, read_bitstreams
 from reconros_zenoh.board.callback import HardwareImplementation
+from reconros_zenoh.board.failures import Failures
 from reconros_zenoh.board.hmt import HmtSource
 from reconros_zenoh.board.host import Limit
 from reconros_zenoh.board.software import SoftwareImplementation
@@ -96,6 +97,7 @@ class Executor:
         self._poll_jitter = model.executor.poll_jitter.share if model else 0.0
         self.calls: Counter[str] = Counter()
         self.failures: Counter[str] = Counter()
+        self._ways_to_fail: defaultdict[str, Failures] = defaultdict(Failures)
 
     def add_sw_callback(
         self,
@@ -195,11 +197,21 @@ class Executor:
         self._finish(dispatch)
 
     def fail(self, dispatch: Dispatch, event: Event, error: BaseException) -> None:
-        """Note that the callback raised: it is logged and counted, and the sender of a request is told."""
+        """Note that the callback raised: it is counted, and the sender of a request is told.
+
+        The first error of a type and place is logged with its traceback.
+        """
         name = dispatch.entry.name
         self.failures[name] += 1
-        spans = ", ".join(f"{stage} {ns / 1e6:g} ms" for stage, ns in event.timeline.stages_ns.items() if ns)
-        _log.error("callback %s failed after %s", name, spans or "0 ms", exc_info=error)
+        if self._ways_to_fail[name].is_new(error):
+            stages = event.timeline.stages_ns.items()
+            spans = ", ".join(f"{stage} {ns / 1e6:g} ms" for stage, ns in stages if ns)
+            _log.error(
+                "callback %s failed after %s; a failure of this kind is not reported again",
+                name,
+                spans or "0 ms",
+                exc_info=error,
+            )
         if event.responder is not None:
             event.responder.fail(f"callback {name} failed: {error}")
         self._finish(dispatch)

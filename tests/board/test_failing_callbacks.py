@@ -99,14 +99,31 @@ def test_a_callback_in_hardware(when: str, caplog: pytest.LogCaptureFixture) -> 
     assert slot.busy_ns == (14 if when == "before the computation" else 114)
 
 
-def test_every_failure_is_logged(caplog: pytest.LogCaptureFixture) -> None:
-    board = small_board(PROFILE)
-    executor, source = software_board(board)
-    for _ in range(3):
-        source.put(0)
+def test_each_way_to_fail_is_logged_once_and_every_failure_is_counted(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    def fails(way: str, _: SoftwareContext) -> None:
+        if way == "here":
+            raise NoughtError(way)
+        if way == "there":
+            raise NoughtError(way)
+        raise KeyError(way) if way == "otherwise" else NoughtError(way)
+
+    board = small_board(small_profile({"a": (100, 100), "b": (100, 100)}))
+    executor = Executor(board, 1, 0)
+    a, b = Tickets(board), Tickets(board)
+    executor.add_sw_callback("a", CallbackKind.SUB, a, fails)
+    executor.add_sw_callback("b", CallbackKind.SUB, b, fails)
+    executor.spin()
+    for way in ("here", "there", "here", "otherwise", "so", "there"):
+        a.put(way)
+    b.put("here")
     board.environment.run(until=1000)
-    assert executor.failures == {"a": 3}
-    assert len(caplog.records) == 3
+    assert executor.failures == {"a": 6, "b": 1}
+    told = sorted(str(record.exc_info[1]) for record in caplog.records if record.exc_info)
+    assert told == ["'otherwise'", "here", "here", "so", "there"]
+    for record in caplog.records:
+        assert record.getMessage().endswith(" ms; a failure of this kind is not reported again")
 
 
 def test_what_a_failed_callback_wanted_to_publish_is_not_published(caplog: pytest.LogCaptureFixture) -> None:
