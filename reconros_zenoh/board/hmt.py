@@ -52,7 +52,11 @@ class FifoPlan:
 
 
 class Streamed(NamedTuple):
-    """A message on its way over a stream; `complete` fires when its last word is there."""
+    """A message on its way over a stream; `complete` fires when its last word is there.
+
+    `publisher` wrote it to the stream, for the filters; `sender` sent it first, for the log: the gid in
+    hexadecimal of who published it in software, or the name of the hardware callback.
+    """
 
     publisher: Hashable
     message: Any
@@ -60,6 +64,7 @@ class Streamed(NamedTuple):
     targets: list[Fifo]
     timeline: Timeline
     complete: Signal
+    sender: str | None
 
 
 class Fifo:
@@ -184,9 +189,9 @@ class HardwareTopic:
         self._tap = Stream(put, QosProfile().depth)
 
     def publish(
-        self, publisher: Hashable, message: Any, size: int, timeline: Timeline
+        self, publisher: Hashable, message: Any, size: int, timeline: Timeline, sender: str | None = None
     ) -> Generator[Awaitable, object, None]:
-        """Return when the message of `size` bytes on the wire has passed.
+        """Return when the message of `size` bytes on the wire has passed; `sender` as in `Streamed`.
 
         Raise BadMessageError when it is larger than somebody's FIFO.
         """
@@ -203,7 +208,7 @@ class HardwareTopic:
             yield full.room
         # All places at once: who held one while waiting for another could keep a third from going on.
         targets = [fifo for fifo in fifos if fifo.reserve()]
-        streamed = Streamed(publisher, message, size, targets, timeline, Signal())
+        streamed = Streamed(publisher, message, size, targets, timeline, Signal(), sender)
         self._passages.put(streamed)
         if streamed.complete.callbacks is not None:
             yield streamed.complete
@@ -273,7 +278,7 @@ class HmtSource:
         except BadMessageError as error:
             bad = self._fifo.messages.pop()
             self._fifo.release()
-            self._board.context.rejections.add(self._topic.key, str(bad.publisher), error)
+            self._board.context.rejections.add(self._topic.key, bad.sender, error)
             return
         self._on_ready()
 
@@ -302,5 +307,5 @@ class HmtWriter:
     def publish(self, message: object, osif: Osif, timeline: Timeline) -> Generator[Awaitable, object, None]:  # noqa: ARG002
         """Return when the message has passed the stream, after waiting for room where a FIFO blocks."""
         size = sum(map(len, self._topic.type.encode(message)))
-        yield from self._topic.publish(self, message, size, timeline.fork())
+        yield from self._topic.publish(self, message, size, timeline.fork(), timeline.callback)
         timeline.mark("hmt")

@@ -158,15 +158,28 @@ def test_boards_whose_gateways_share_a_topic_hear_each_other_once(profile: Profi
     assert sorted(heard_elsewhere) == [0, 1, 2, 10, 11, 12]
 
 
-def test_a_message_that_no_fifo_holds_is_refused_and_the_gateway_goes_on() -> None:
-    side = Side(small_board(modelled()))
+@pytest.mark.parametrize("topics", [TOPICS, None], ids=["local topics", "network only"])
+def test_a_message_that_no_fifo_holds_is_refused_and_the_gateway_goes_on(
+    topics: Any, caplog: pytest.LogCaptureFixture
+) -> None:
+    profile = small_profile(topics=topics, cores=4, hmt_overhead_ns=G, cancel_ns=C)
+    side = Side(small_board(profile))
+    side.environment.run()
+    elsewhere = [desktop(side.board).node(name).publisher(words, "/a") for name in ("x", "y")]
     side.topic.subscribe(Fifo(FifoPlan(100, message_bytes=U), lambda: None, None, cut_through=False))
-    side.publish_in_software(message(1, U + 1))
+    for _ in range(2):
+        side.publish_in_software(message(1, U + 1))
+        for publisher in elsewhere:
+            publisher.publish(message(1, U + 1))
     side.publish_in_software(message(2))
     side.environment.run()
-    assert side.gateway.refused == 1
-    assert side.board.context.rejections.counts() == {"fifo_size": 1}
-    assert side.numbers() == [[2], [2], [1, 2]]
+    assert side.gateway.refused == 6
+    assert side.board.context.rejections.counts() == {"fifo_size": 6}
+    assert [heard[-1] for heard in side.numbers()] == [2, 2, 2]
+    senders = [side.writer.gid, *(publisher.gid for publisher in elsewhere)]
+    assert sorted(text.split(" (")[0] for text in caplog.messages) == sorted(
+        f"refused a message on hmt/board0/a from publisher {sender.hex()}" for sender in senders
+    )
 
 
 def test_a_second_gateway_on_a_topic_is_refused_and_so_is_another_type() -> None:

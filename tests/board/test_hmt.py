@@ -206,8 +206,10 @@ def test_a_kernel_at_a_software_mapped_topic_pays_the_memif_for_the_same_lines()
     assert board.memif.transferred_bytes == 100 - HEADER
 
 
-def test_a_bad_message_is_counted_and_its_place_is_free_again() -> None:
-    board = small_board(small_profile())
+def test_a_bad_message_is_counted_logged_once_per_callback_and_its_place_is_free_again(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    board = small_board(small_profile({"left": (0, 0), "right": (0, 0)}), slots=2)
     topic = board.hardware_topic("/a", words)
     source = HmtSource(board, topic, FifoPlan(depth=1))
 
@@ -215,12 +217,23 @@ def test_a_bad_message_is_counted_and_its_place_is_free_again() -> None:
         raise BadMessageError("image_size", "too small")
 
     source.open(lambda: None, check)
+    executor = Executor(board, 0, 2)
+    tickets = [Tickets(board), Tickets(board)]
+    for slot, name in enumerate(("left", "right")):
+        callback = relay(HmtWriter(topic), [])
+        executor.add_hw_callback(name, [slot], CallbackKind.SUB, tickets[slot], callback)
+    executor.spin()
     for _ in range(3):
-        start(board.environment, topic.publish("p", message(20), 20, Timeline(board.environment, 0)))
+        for end in tickets:
+            end.put(message(20))
     board.environment.run()
     assert not source.is_ready()
-    assert topic.passed == 3
-    assert dict(board.context.rejections.counts()) == {"image_size": 3}
+    assert topic.passed == 6
+    assert dict(board.context.rejections.counts()) == {"image_size": 6}
+    assert sorted(text.split(" (")[0] for text in caplog.messages) == [
+        "refused a message on hmt/board0/a from publisher left",
+        "refused a message on hmt/board0/a from publisher right",
+    ]
 
 
 def test_no_end_of_a_stream_runs_in_software() -> None:
