@@ -14,6 +14,7 @@ from reconros_zenoh.board.endpoints import Event
 from reconros_zenoh.board.stream import Stream
 from reconros_zenoh.clock.activity import Signal
 from reconros_zenoh.errors import BadMessageError, UsageError
+from reconros_zenoh.ros.message_arrays import snapshot
 from reconros_zenoh.ros.qos import QosProfile
 
 if TYPE_CHECKING:
@@ -141,8 +142,8 @@ class HardwareTopic:
     One message passes at a time, to all subscribers at once, in the order in which publishers found room: one
     that has to wait does not keep another from passing, or a gateway that is about to write could not go on
     to read. A publisher publishes one message at a time. A message takes its size through the stream's
-    bandwidth; bodies are handed over by reference. `overhead_ns` is what a subscribing slot needs to take a
-    message over.
+    bandwidth; bodies, which must not change any more, are handed over by reference. `overhead_ns` is what a
+    subscribing slot needs to take a message over.
     """
 
     def __init__(self, board: Board, topic: str, message_type: MessageType) -> None:
@@ -305,7 +306,11 @@ class HmtWriter:
         """Do nothing: `encode` has raised."""
 
     def publish(self, message: object, osif: Osif, timeline: Timeline) -> Generator[Awaitable, object, None]:  # noqa: ARG002
-        """Return when the message has passed the stream, after waiting for room where a FIFO blocks."""
-        size = sum(map(len, self._topic.type.encode(message)))
+        """Return when the message has passed the stream, after waiting for room where a FIFO blocks.
+
+        Subscribers get the message as it is now; what the callback does with it afterwards is its own affair.
+        """
+        size = sum(map(len, self._topic.type.encode(message, joined_at_once=True)))
+        message = snapshot(message)
         yield from self._topic.publish(self, message, size, timeline.fork(), timeline.callback)
         timeline.mark("hmt")

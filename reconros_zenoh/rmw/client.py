@@ -50,7 +50,8 @@ class Client(Endpoint):
         def on_received(received: Received | BadMessageError | TransportError) -> None:
             on_response(received.message if isinstance(received, Received) else received)
 
-        self.call_encoded(self.service_type.request.encode(request), on_received, timeout_ns)
+        parts = self.service_type.request.encode(request, joined_at_once=True)
+        self.call_encoded(parts, on_received, timeout_ns)
 
     def call_encoded(
         self,

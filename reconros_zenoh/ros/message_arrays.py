@@ -1,9 +1,9 @@
-"""The arrays of numbers in a message."""
+"""The arrays of numbers in a message: which there are, where they lie, and who can change them."""
 
 from __future__ import annotations
 
 from dataclasses import fields, is_dataclass
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar, cast
 
 import numpy as np
 
@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
 Array: TypeAlias = "np.ndarray[Any, Any]"
+T = TypeVar("T")
 
 
 def arrays_of(message: object) -> Iterator[Array]:
@@ -23,6 +24,33 @@ def arrays_of(message: object) -> Iterator[Array]:
     elif is_dataclass(message):
         for field in fields(message):
             yield from arrays_of(getattr(message, field.name))
+
+
+def is_unchanging(array: Array) -> bool:
+    """Tell whether nobody can write to the array, nor to what it is a view of."""
+    memory: object = array
+    while isinstance(memory, np.ndarray):
+        if memory.flags.writeable:
+            return False
+        memory = memory.base
+    return memory is None or isinstance(memory, bytes) or (isinstance(memory, memoryview) and memory.readonly)
+
+
+def snapshot(value: T) -> T:
+    """Return the message, array or list of them as it is now and stays: its arrays are read-only.
+
+    Arrays that nobody can change are handed over by reference, all others are copied.
+    """
+    copy: object = value
+    if isinstance(value, np.ndarray):
+        if not is_unchanging(value):
+            copy = value.copy()
+            copy.flags.writeable = False
+    elif isinstance(value, list):
+        copy = [snapshot(element) for element in value]
+    elif is_dataclass(value) and not isinstance(value, type):
+        copy = type(value)(**{field.name: snapshot(getattr(value, field.name)) for field in fields(value)})
+    return cast("T", copy)
 
 
 def lies_in(part: Array, whole: Array) -> bool:

@@ -43,9 +43,10 @@ def size_of(body: Any) -> int:
 
 
 def message(number: int = 0, size: int = U) -> Any:
-    """A message of `size` bytes on the wire whose first byte is the number."""
+    """A message of `size` bytes on the wire whose first byte is the number; it cannot change any more."""
     data = np.zeros(size - HEADER, np.uint8)
     data[0] = number
+    data.flags.writeable = False
     return words.cls(layout=layout, data=data)
 
 
@@ -98,7 +99,7 @@ def test_from_hardware_a_message_is_streamed_to_all_and_written_to_memory_once(s
     side.environment.run()
     assert side.hardware == [[(U + G, body)]] * subscribers
     assert side.software == [(U + C + A + D, body)]
-    assert side.software[0][1] is body
+    assert side.software[0][1].data is body.data
     assert side.board.memif.transferred_bytes == U
 
 
@@ -110,7 +111,7 @@ def test_from_software_it_is_read_from_memory_once_while_it_is_streamed(subscrib
     side.environment.run()
     assert side.hardware == [[(A + K * U + D + U + G, body)]] * subscribers
     assert side.software == [(A + K * U + E + L * U, body)]
-    assert side.hardware[0][0][1] is body
+    assert side.hardware[0][0][1].data is body.data
     assert side.board.memif.transferred_bytes == U
 
 

@@ -183,11 +183,50 @@ def test_a_kernel_between_two_streams_costs_no_memif() -> None:
     board.environment.run()
     assert log[0] is body.data
     streamed = arrived.take()
-    assert streamed.message is body
+    # The first stream did not copy it, because the test published it; the second had to.
+    assert streamed.message.data.tolist() == body.data.tolist()
+    assert streamed.message.data is not body.data
     assert board.memif.transferred_bytes == 0
     # 100 ns on one stream, 1000 to load the slot, 100 on the other
     assert streamed.timeline.stages_ns["reconfiguration"] == 1000
     assert board.environment.now == 1200
+
+
+@pytest.mark.parametrize("writeable", [True, False])
+def test_what_becomes_of_a_message_after_it_was_published_is_the_publishers_own_affair(
+    writeable: bool,
+) -> None:
+    data = np.zeros(84, np.uint8)
+    data.flags.writeable = writeable
+    board = small_board(small_profile({"a": (0, 0)}), slots=1)
+    topic = board.hardware_topic("/out", words)
+    arrived = Fifo(FifoPlan(), lambda: None, None, cut_through=False)
+    other = Fifo(FifoPlan(), lambda: None, None, cut_through=False)
+    topic.subscribe(arrived)
+    topic.subscribe(other)
+    writer = HmtWriter(topic)
+
+    def thread(hardware: Any) -> Steps:
+        body = words.cls(layout=layout, data=data)
+        if writeable:
+            board.environment.call_later(50, data.fill, 1)  # while the words pass
+        yield from hardware.publish(writer, body)
+        body.data = np.full(84, 2, np.uint8)
+        yield from hardware.publish(writer, body)
+
+    executor, tickets = Executor(board, 0, 1), Tickets(board)
+    executor.add_hw_callback("a", [0], CallbackKind.SUB, tickets, thread)
+    executor.spin()
+    tickets.put(None)
+    board.environment.run()
+    assert executor.failures == {}
+    assert data[0] == (1 if writeable else 0)
+    messages = [arrived.take().message for _ in range(2)]
+    assert [message.data[0] for message in messages] == [0, 2]
+    # Nor can one subscriber change what another one gets.
+    assert all(message is other.take().message for message in messages)
+    assert not any(message.data.flags.writeable for message in messages)
+    assert (messages[0].data is data) != writeable
 
 
 def test_a_kernel_at_a_software_mapped_topic_pays_the_memif_for_the_same_lines() -> None:
