@@ -24,10 +24,10 @@ if TYPE_CHECKING:
     from reconros_zenoh.board.actions import ActionClientSource
     from reconros_zenoh.board.bitstream import Bitstream
     from reconros_zenoh.board.board import Board
+    from reconros_zenoh.board.clients import ClientSource
     from reconros_zenoh.board.endpoints import Event, MessageWriter
     from reconros_zenoh.board.host import Limit
     from reconros_zenoh.board.slots import ReconfigurableSlot
-    from reconros_zenoh.board.software import Outlet
     from reconros_zenoh.board.timing import ExecutionTime
     from reconros_zenoh.clock.activity import Awaitable
     from reconros_zenoh.rmw.action_server import GoalHandle
@@ -126,6 +126,7 @@ class HardwareThread(DelegateCalls):
 
     A hardware callback is a generator over it, written like the listings of the paper:
     `image = yield from thread.mem_read(message.data)`. Every call is charged in the model.
+    `sequence_number` is as in a `SoftwareContext`: it came with the init data.
     Source: ReconROS Executor, Section IV, Listings 2 and 3.
     """
 
@@ -144,6 +145,7 @@ class HardwareThread(DelegateCalls):
         self._slot = slot
         self._time = implementation.time
         self._limit = implementation.limit
+        self.sequence_number = event.sequence_number
         self._in_slot = event.in_slot
         self._message = (
             event.message
@@ -249,10 +251,15 @@ class HardwareThread(DelegateCalls):
             message = self._in_memory(message)
         yield from writer.publish(message, self._osif, self._timeline)
 
-    def call(self, client: Outlet, request: object) -> Generator[Awaitable, object, None]:
-        """Call a service through the delegate; its response starts a CLT callback."""
+    def call(self, client: ClientSource, request: object) -> Generator[Awaitable, object, int]:
+        """Call a service through the delegate and return the call's sequence number.
+
+        Its response starts a CLT callback.
+        """
         yield from self._call()
-        client.send(client.encode(request), self._timeline.fork())
+        parts, sequence_number = client.encode(request), client.next_sequence_number()
+        client.send(parts, sequence_number, self._timeline.fork())
+        return sequence_number
 
     def send_goal(self, client: ActionClientSource, goal: object) -> Generator[Awaitable, object, bytes]:
         """Send the goal through the delegate and return its id; what becomes of it starts a CLT callback."""

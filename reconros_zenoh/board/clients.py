@@ -29,7 +29,8 @@ class ClientSource(Reader):
     """A service client: callbacks call with it, and it is ready while a response waits.
 
     The callback gets each response as its message, and None for a call that the server refused or did not
-    answer within `timeout_ns`, which is logged. Responses come in the order in which they arrive.
+    answer within `timeout_ns`, which is logged. Responses come in the order in which they arrive; each call
+    has a `sequence_number`, which stands on the wire as in ROS 2.
     """
 
     def __init__(
@@ -60,25 +61,35 @@ class ClientSource(Reader):
         """Return the request as it goes over the wire; callable from any thread."""
         return self._client.service_type.request.encode(request)
 
-    def send(self, parts: Parts, timeline: Timeline) -> None:
+    def next_sequence_number(self) -> int:
+        """Return the number of the next call; callable from any thread."""
+        return self._client.next_sequence_number()
+
+    def send(self, parts: Parts, sequence_number: int, timeline: Timeline) -> None:
         """Call the service with an encoded request."""
-        call = partial(self._client.call_encoded, parts, self._on_response, self._timeout_ns)
+        on_response = partial(self._on_response, sequence_number)
+        call = partial(
+            self._client.call_encoded, parts, on_response, self._timeout_ns, sequence_number=sequence_number
+        )
         self._writer.put(parts, timeline, call)
 
-    def _on_response(self, response: Received | BadMessageError | TransportError) -> None:
+    def _on_response(
+        self, sequence_number: int, response: Received | BadMessageError | TransportError
+    ) -> None:
         if isinstance(response, Received):
             try:
                 if self._check is not None:
                     self._check(response.message)
             except BadMessageError as error:
                 self._client.context.rejections.add(self._client.key, None, error)
-                self._board.environment.post(self._give_up, error)
+                self._board.environment.post(self._give_up, sequence_number, error)
             else:
                 self.arrive(response)
         else:
-            self._board.environment.post(self._give_up, response)
+            self._board.environment.post(self._give_up, sequence_number, response)
 
-    def _give_up(self, reason: BadMessageError | TransportError) -> None:
+    def _give_up(self, sequence_number: int, reason: BadMessageError | TransportError) -> None:
         self.unanswered += 1
         _log.warning("a call of service %s has no answer: %s", self._client.name, reason)
-        self.enqueue(Event(None, Timeline(self._board.environment, self._board.environment.now)))
+        timeline = Timeline(self._board.environment, self._board.environment.now)
+        self.enqueue(Event(None, timeline, sequence_number=sequence_number))

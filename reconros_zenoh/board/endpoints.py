@@ -33,8 +33,9 @@ class Event:
 
     `message_type` is None for what has no place in memory as a C struct. `in_slot`: it came over a
     hardware-mapped topic, so a slot need not read it from main memory. `size` is that of a subscription's
-    message in bytes on the wire, `publisher` the gid of who sent it. `lasting`: how long its callback takes
-    depends on other events, as that of a goal on being canceled.
+    message in bytes on the wire, `publisher` the gid of who sent it, `sequence_number` that of the call which
+    a response, or its absence, belongs to. `lasting`: how long its callback takes depends on other events, as
+    that of a goal on being canceled.
     """
 
     message: Any
@@ -44,6 +45,7 @@ class Event:
     in_slot: bool = False
     size: int = 0
     publisher: bytes = b""
+    sequence_number: int | None = None
     lasting: bool = False
 
 
@@ -162,6 +164,7 @@ class Reader:
                     self._message_type,
                     size=received.size,
                     publisher=received.publisher,
+                    sequence_number=received.sequence_number,
                 )
             )
         else:

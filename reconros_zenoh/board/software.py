@@ -12,6 +12,7 @@ if TYPE_CHECKING:
 
     from reconros_zenoh.board.actions import ActionClientSource
     from reconros_zenoh.board.board import Board
+    from reconros_zenoh.board.clients import ClientSource
     from reconros_zenoh.board.host import Limit
     from reconros_zenoh.board.os_resources import Condition, Mailbox, Mutex, Semaphore
     from reconros_zenoh.board.spans import Timeline
@@ -34,7 +35,7 @@ class SoftwareImplementation:
 
 
 class Outlet(Protocol):
-    """Where a callback sends messages: a publisher, or a client of a service or action."""
+    """Where a callback publishes messages."""
 
     def encode(self, message: object) -> Parts:
         """Return the message as it goes over the wire; callable from any thread."""
@@ -47,12 +48,15 @@ class SoftwareContext:
     """What a software callback can do besides computing; it belongs to one call of it, in one thread.
 
     `log` is the callback's logger, `started_ns` the time on the board's clock at which the callback began.
+    `sequence_number` says which call the response belongs to that started a service client's callback; it is
+    what `call` has returned then, and None for all other callbacks.
     """
 
-    def __init__(self, board: Board, callback: str, time: ExecutionTime) -> None:
+    def __init__(self, board: Board, callback: str, time: ExecutionTime, sequence_number: int | None) -> None:
         self._board = board
         self._callback = callback
         self.started_ns = board.environment.now
+        self.sequence_number = sequence_number
         # What is measured is really computed each time.
         self._really = time.ns is None and time.modelled
         self._mutexes: dict[Mutex, None] = {}
@@ -78,9 +82,14 @@ class SoftwareContext:
         """Publish the message once the callback has run to completion."""
         self.sends.append(partial(writer.send, writer.encode(message)))
 
-    def call(self, client: Outlet, request: object) -> None:
-        """Call the service once the callback has run to completion; its response starts a CLT callback."""
-        self.publish(client, request)
+    def call(self, client: ClientSource, request: object) -> int:
+        """Call the service once the callback has run to completion, and return the call's sequence number.
+
+        Its response starts a CLT callback.
+        """
+        parts, sequence_number = client.encode(request), client.next_sequence_number()
+        self.sends.append(partial(client.send, parts, sequence_number))
+        return sequence_number
 
     def send_goal(self, client: ActionClientSource, goal: object) -> bytes:
         """Send the goal once the callback has run to completion, and return its id.

@@ -93,7 +93,7 @@ class SoftwareWorker(Worker):
         yield from board.cpu.run(self._executor.dispatch_ns)
         timeline.mark("dispatch")
         implementation = cast("SoftwareImplementation", dispatch.implementation)
-        context = SoftwareContext(board, dispatch.entry.name, implementation.time)
+        context = SoftwareContext(board, dispatch.entry.name, implementation.time, event.sequence_number)
         try:
             response = yield from self._within(
                 implementation.limit, self._run_function(implementation, event, context)

@@ -38,7 +38,7 @@ class Publisher(Endpoint):
 
     def publish_encoded(self, parts: Parts) -> None:
         """Publish a message that is encoded already, as `message_type.encode` does."""
-        self._publisher.put(parts, self.next_attachment())
+        self._publisher.put(parts, self.attachment(self.next_sequence_number()))
 
     def close(self) -> None:
         """Withdraw the publisher; idempotent."""
