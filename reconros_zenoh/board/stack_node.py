@@ -53,6 +53,11 @@ class StackNode:
         """The session of the node."""
         return self._node.context
 
+    @property
+    def fully_qualified_name(self) -> str:
+        """The name of the node behind its namespace."""
+        return self._node.fully_qualified_name
+
     def publisher(self, message_type: MessageType, topic: str, qos: QosProfile) -> StackPublisher:
         """Return a new publisher."""
         publisher = self._node.publisher(message_type, topic, qos)
