@@ -17,7 +17,7 @@ from reconros_zenoh.board.host import Limit
 from reconros_zenoh.board.software import SoftwareImplementation
 from reconros_zenoh.board.timing import hardware_time, software_time
 from reconros_zenoh.board.workers import HardwareWorker, SoftwareWorker
-from reconros_zenoh.errors import UsageError
+from reconros_zenoh.errors import BadMessageError, UsageError
 from reconros_zenoh.executor.callbacks import CallbackEntry, CallbackKind
 from reconros_zenoh.executor.reconros import ReconrosExecutor
 from reconros_zenoh.executor.resource_mask import ResourceMask
@@ -111,6 +111,7 @@ class Executor:
     ) -> None:
         """Let the callback `name` run as a function; `check` raises BadMessageError for bad messages.
 
+        A message whose check raises anything else is refused as well, with the reason `check_failed`.
         How long it takes says `timing`, or without it the table of the profile. A call that takes longer than
         `limit_ms` is failed and its worker goes on; what its function still does is not heard of.
         """
@@ -182,7 +183,8 @@ class Executor:
         for entry in self._policy.callbacks:
             self._workers_of[entry.name] = [worker for worker in workers if worker.resource in entry.mask]
             registration = self._registrations[entry.name]
-            registration.source.open(partial(self._became_ready, entry), registration.check)
+            check = registration.check and partial(_check_message, entry.name, registration.check)
+            registration.source.open(partial(self._became_ready, entry), check)
 
     def select(self, worker: Worker, resource: int) -> Dispatch | None:
         """Return the callback that this worker must run now, its message taken, or None."""
@@ -268,6 +270,18 @@ class Executor:
 def _check_function(callback: str, function: object) -> None:
     if not callable(function):
         raise UsageError(f"callback {callback!r} is {function!r}, which cannot be called. Give a function.")
+
+
+def _check_message(callback: str, check: Callable[[Any], None], message: object) -> None:
+    """Refuse the message also where the check itself fails: that must harm neither sender nor board."""
+    try:
+        check(message)
+    except BadMessageError:
+        raise
+    except (Exception, SystemExit) as error:
+        raise BadMessageError(
+            "check_failed", f"the check of callback {callback} failed: {error!r}"
+        ) from error
 
 
 def _limit(callback: str, limit_ms: float | None) -> Limit | None:

@@ -6,11 +6,14 @@ import logging
 import sys
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import pytest
-from small_board import Tickets, desktop, small_board, small_profile, types
+from small_board import Tickets, desktop, small_board, small_profile, start, types
 
 from reconros_zenoh.board.endpoints import ServiceSource, SubscriptionSource, TopicWriter
 from reconros_zenoh.board.executor import Executor
+from reconros_zenoh.board.hmt import FifoPlan, HmtSource, HmtWriter
+from reconros_zenoh.board.spans import Timeline
 from reconros_zenoh.errors import TransportError
 from reconros_zenoh.executor.callbacks import CallbackKind
 
@@ -284,3 +287,67 @@ def test_hardware_callbacks_that_are_not_written_as_they_must_be(
         board.environment.run(until=100_000)
         assert executor.failures == {"a": 2}, callback
         assert text in str(caplog.records[0].exc_info[1])  # type: ignore[index]
+
+
+BYTES = types().message("std_msgs/msg/UInt8MultiArray")
+
+
+def a_message(value: int) -> Any:
+    layout = types().message("std_msgs/msg/MultiArrayLayout").cls(dim=[], data_offset=0)
+    return BYTES.cls(layout=layout, data=np.full(4, value, np.uint8))
+
+
+@pytest.mark.parametrize("way", ["network", "board", "stream", "stream with overhead"])
+@pytest.mark.parametrize("wrong", [lambda: sys.exit(3), lambda: {}["no"]], ids=["exit", "error"])
+def test_a_check_that_fails_itself_refuses_the_message_and_harms_nobody(
+    way: str, wrong: Callable[[], Any], caplog: pytest.LogCaptureFixture
+) -> None:
+    overhead_ns = 7 if way == "stream with overhead" else 0
+    board = small_board(
+        small_profile(
+            {"picky": (0, 0), "patient": (0, 0)},
+            hmt_overhead_ns=overhead_ns,
+            topics={} if way == "board" else None,
+        ),
+        slots=2,
+    )
+    topic, node = board.hardware_topic("/a", BYTES), board.context.node("n")
+
+    def check(message: Any) -> None:
+        if message.data[0] == 0:
+            wrong()
+
+    heard: dict[str, list[int]] = {"picky": [], "patient": []}
+
+    def listen(name: str) -> Callable[[HardwareThread], Steps]:
+        def thread(thread: HardwareThread) -> Steps:
+            message = yield from thread.get_init_data()
+            heard[name].append(int(message.data[0]))
+
+        return thread
+
+    executor = Executor(board, 0, 2)
+    for slot, name in enumerate(heard):
+        source = (
+            HmtSource(board, topic, FifoPlan())
+            if way.startswith("stream")
+            else SubscriptionSource(board, node, BYTES, "/a", in_hardware=True)
+        )
+        executor.add_hw_callback(
+            name, [slot], CallbackKind.SUB, source, listen(name), check if name == "picky" else None
+        )
+    executor.spin()
+    publisher = desktop(board).node("c").publisher(BYTES, "/a")
+    writer = HmtWriter(topic) if way.startswith("stream") else board.writer(node, BYTES, "/a")
+    # More than a FIFO holds: a message that is refused must give its place back.
+    for value in (0, 0, 0, 1):
+        if way == "network":
+            publisher.publish(a_message(value))
+        else:
+            timeline = Timeline(board.environment, board.environment.now)
+            start(board.environment, writer.publish(a_message(value), board.osif, timeline))
+    board.environment.run(until=100_000)
+    assert heard == {"picky": [1], "patient": [0, 0, 0, 1]}
+    assert board.context.rejections.counts() == {"check_failed": 3}
+    (text,) = caplog.messages
+    assert "the check of callback picky failed: " in text
