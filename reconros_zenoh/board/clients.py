@@ -29,8 +29,9 @@ class ClientSource(Reader):
     """A service client: callbacks call with it, and it is ready while a response waits.
 
     The callback gets each response as its message, and None for a call that the server refused or did not
-    answer within `timeout_ns`, which is logged. Responses come in the order in which they arrive; each call
-    has a `sequence_number`, which stands on the wire as in ROS 2.
+    answer within `timeout_ns`: the first of them since the last response is logged, `unanswered` counts them.
+    Responses come in the order in which they arrive; each call has a `sequence_number`, which stands on the
+    wire as in ROS 2. Of calls that wait to be sent the last 10 are kept, of responses as well.
     """
 
     def __init__(
@@ -46,7 +47,13 @@ class ClientSource(Reader):
         self._writer = Writer(board, QosProfile())
         self._timeout_ns = timeout_ns
         self._check: Callable[[Any], None] | None = None
+        self._is_answered = True
         self.unanswered = 0
+
+    @property
+    def dropped(self) -> int:
+        """How many calls and responses were pushed out by newer ones."""
+        return super().dropped + self._writer.dropped
 
     def open(self, on_ready: Callable[[], None], check: Callable[[Any], None] | None) -> None:
         """Begin to hand out responses; one that `check` refuses counts as not answered."""
@@ -84,12 +91,19 @@ class ClientSource(Reader):
                 self._client.context.rejections.add(self._client.key, None, error)
                 self._board.environment.post(self._give_up, sequence_number, error)
             else:
+                self._is_answered = True
                 self.arrive(response)
         else:
             self._board.environment.post(self._give_up, sequence_number, response)
 
     def _give_up(self, sequence_number: int, reason: BadMessageError | TransportError) -> None:
         self.unanswered += 1
-        _log.warning("a call of service %s has no answer: %s", self._client.name, reason)
+        if self._is_answered:
+            self._is_answered = False
+            _log.warning(
+                "a call of service %s has no answer: %s; until one has, this is not reported again",
+                self._client.name,
+                reason,
+            )
         timeline = Timeline(self._board.environment, self._board.environment.now)
         self.enqueue(Event(None, timeline, sequence_number=sequence_number))

@@ -20,15 +20,17 @@ if TYPE_CHECKING:
     from reconros_zenoh.board.software import SoftwareContext
 
 SET_BOOL = types().service("std_srvs/srv/SetBool")
-PROFILE = small_profile({"ask": (100, 100), "hear": (50, 50)}, link_ns=1000, osif_ns=7)
+CALLBACKS = {"ask": (100, 100), "hear": (50, 50)}
 SECOND_NS = 10**9
 
 
 class Asking:
     """A board whose callback `ask` calls the service and whose callback `hear` gets the responses."""
 
-    def __init__(self, *, hardware: bool = False, serve: bool = True, check: Any = None) -> None:
-        self.board = small_board(PROFILE, 2)
+    def __init__(
+        self, *, hardware: bool = False, serve: bool = True, check: Any = None, **options: Any
+    ) -> None:
+        self.board = small_board(small_profile(CALLBACKS, link_ns=1000, osif_ns=7, **options), 2)
         self.client = ClientSource(self.board, self.board.context.node("client"), SET_BOOL, "set", SECOND_NS)
         self.executor = Executor(self.board, 1, 2)
         self.tickets = Tickets(self.board)
@@ -100,6 +102,32 @@ def test_a_call_without_an_answer_is_told_as_none(hardware: bool, caplog: pytest
     assert [response for _, response in case.heard] == [None]
     assert case.client.unanswered == 1
     assert "a call of service /set has no answer: no answer from service /set" in caplog.text
+
+
+def test_that_nobody_answers_is_logged_once_until_somebody_does(caplog: pytest.LogCaptureFixture) -> None:
+    case = Asking(serve=False)
+    node = desktop(case.board).node("server")
+    node.service(
+        SET_BOOL,
+        "set",
+        lambda received: (
+            case.serve(received) if received.message.data else received.responder.fail("no time")
+        ),
+    )
+    for ticket in (0, 0, 0, 1, 0, 0):
+        case.tickets.put(ticket)
+        case.board.environment.run(until=case.board.environment.now + 10_000)
+    assert case.client.unanswered == 5
+    text = "a call of service /set has no answer: service /set refused: no time"
+    assert caplog.messages == [f"{text}; until one has, this is not reported again"] * 2
+
+
+def test_calls_that_are_pushed_out_before_they_are_sent_are_counted() -> None:
+    case = Asking(dds_message_ns=1_000_000)
+    case.run(*range(15))
+    # One goes through the stack, ten wait, each further one pushes the oldest out.
+    assert len(case.requests) == len(case.heard) == 11
+    assert case.executor.statistics()["hear"]["dropped"] == 4
 
 
 def test_a_server_that_says_nothing_is_given_up_in_time(caplog: pytest.LogCaptureFixture) -> None:
