@@ -208,8 +208,12 @@ class _Results:
         self._lock = threading.Lock()
 
     def of(self, kernel: Callable[..., R], *arguments: object) -> R:
-        """Return `kernel(*arguments)`, computed unless it is known."""
+        """Return `kernel(*arguments)`, computed unless it is known; it never is for a list or a message."""
         key = (kernel, *(_identity(argument) for argument in arguments))
+        try:
+            hash(key)
+        except TypeError:
+            return _frozen(kernel(*arguments), arguments)
         with self._lock:
             if key in self._kept:
                 self._kept.move_to_end(key)
@@ -241,10 +245,13 @@ class _Unchanging:
 
 
 def _identity(argument: object) -> object:
-    """Return something equal for equal arguments: arrays by shape, type and a hash of their content."""
+    """Return something equal for equal arguments: arrays by shape, type and a hash of their content.
+
+    Numbers of different types are different, as a kernel may overflow with one of them.
+    """
     if isinstance(argument, np.ndarray):
         if argument.base is None and not argument.flags.writeable:
             return _Unchanging(argument)
         content = np.ascontiguousarray(argument)
         return argument.shape, argument.dtype.str, xxhash.xxh3_128_digest(content.data)
-    return argument
+    return type(argument), argument

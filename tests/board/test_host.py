@@ -258,6 +258,28 @@ def test_nobody_can_change_a_result_that_others_may_get(threads: int | None) -> 
     host.close()
 
 
+def test_equal_numbers_of_different_types_are_different_arguments() -> None:
+    host = Host(VirtualEnvironment(), threads=None)
+    kernel = Counting(type)
+    numbers = [1, 1.0, True, np.uint8(1), np.int64(1)]
+    assert [host.compute(kernel, number) for number in numbers * 2] == [
+        type(number) for number in numbers
+    ] * 2
+    assert kernel.calls == 5
+
+
+@pytest.mark.parametrize("threads", [None, 1])
+def test_what_has_no_hash_is_computed_each_time(threads: int | None) -> None:
+    host = Host(VirtualEnvironment(), threads)
+    kernel = Counting(len)
+    numbers = [1, 2]
+    assert host.compute(kernel, numbers) == 2
+    numbers.append(3)
+    assert host.compute(kernel, numbers) == 3
+    assert kernel.calls == 2
+    host.close()
+
+
 def test_two_kernels_do_not_share_results() -> None:
     host = Host(VirtualEnvironment(), threads=None)
     assert host.compute(np.max, GRID) == 5
