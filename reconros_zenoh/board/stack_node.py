@@ -33,6 +33,7 @@ class Arrived(NamedTuple):
     size: int
     transit_ns: int
     responder: Responder | None
+    publisher: bytes
     timeline: Timeline
 
 
@@ -107,7 +108,14 @@ class Arrivals:
         timeline = Timeline(environment, environment.now - received.transit_ns)
         timeline.callback = self._label
         self._stream.put(
-            Arrived(received.message, received.size, received.transit_ns, received.responder, timeline)
+            Arrived(
+                received.message,
+                received.size,
+                received.transit_ns,
+                received.responder,
+                received.publisher,
+                timeline,
+            )
         )
 
     def _receive(self, arrived: Arrived) -> Generator[Awaitable, object, None]:

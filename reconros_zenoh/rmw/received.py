@@ -23,7 +23,8 @@ class Received(NamedTuple):
 
     `transit_ns` is the present time of the context's clock minus the source timestamp: between hosts it is
     only as good as their clocks agree. `responder` is None but for a request, `publisher` is the gid of the
-    publisher of a message, `sequence_number` that of the call which a response answers.
+    publisher of a message or the client of a request, `sequence_number` that of the call which a response
+    answers.
     """
 
     message: Any

@@ -124,6 +124,24 @@ def test_a_callback_that_fails_aborts_its_goal(caplog: pytest.LogCaptureFixture)
     assert case.executor.failures == {"serve": 2}
 
 
+def test_goals_that_are_refused_are_logged_once_for_each_client(caplog: pytest.LogCaptureFixture) -> None:
+    def check(_: Any) -> None:
+        raise BadMessageError("order", "too many")
+
+    case = Serving(in_software, hardware=False, check=check)
+    other = ActionClient(desktop(case.board).node("other"), FIBONACCI, "fibonacci", case.events.append)
+    case.run(1)
+    for _ in range(2):
+        case.send(1)
+        other.send_goal(FIBONACCI.goal.cls(order=1), other.new_goal_id())
+    assert case.run() == ["rejected"] * 4
+    assert case.board.context.rejections.counts() == {"order": 4}
+    senders = [client._send_goal.gid.hex() for client in (case.client, other)]  # type: ignore[attr-defined]
+    assert sorted(text.split(" (")[0] for text in caplog.messages) == sorted(
+        f"refused a message on fibonacci from publisher {sender}" for sender in senders
+    )
+
+
 def test_goals_that_are_refused() -> None:
     def check(goal: Any) -> None:
         if goal.order > 10:
