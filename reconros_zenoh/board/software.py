@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import logging
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any, Protocol, TypeAlias, TypeVar
+
+from reconros_zenoh.errors import CallbackError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -60,6 +63,7 @@ class SoftwareContext:
         # What is measured is really computed each time.
         self._really = time.ns is None and time.modelled
         self._mutexes: dict[Mutex, None] = {}
+        self._is_over = False
         self.sends: list[Callable[[Timeline], object]] = []
 
     @property
@@ -113,9 +117,17 @@ class SoftwareContext:
         return mailbox.try_put(word)
 
     def mutex_trylock(self, mutex: Mutex) -> bool:
-        """Hold the mutex, until the callback ends at the latest, and return True; or return False."""
+        """Hold the mutex, until the callback ends at the latest, and return True; or return False.
+
+        Raises CallbackError in a function that runs on although its call is over its limit.
+        """
         self._mutexes[mutex] = None
-        return mutex.try_lock(self)
+        locked = mutex.try_lock(self)
+        # Asked after it is locked: either this sees that the call is over, or its end sees the mutex.
+        if self._is_over:
+            self._release(mutex)
+            raise CallbackError(f"callback {self._callback} is over its limit: it gets no mutex any more.")
+        return locked
 
     def mutex_unlock(self, mutex: Mutex) -> None:
         """Let others have the mutex."""
@@ -139,6 +151,12 @@ class SoftwareContext:
 
     def release_mutexes(self) -> None:
         """Let others have every mutex that is still held: the call has ended, maybe with an error."""
-        for mutex in self._mutexes:
-            if mutex.is_held_by(self):
-                mutex.unlock(self)
+        self._is_over = True
+        for mutex in list(self._mutexes):
+            self._release(mutex)
+
+    def _release(self, mutex: Mutex) -> None:
+        with suppress(
+            CallbackError
+        ):  # it is not held, or its holder has just given it back in another thread
+            mutex.unlock(self)
