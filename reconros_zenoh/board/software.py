@@ -100,7 +100,7 @@ class SoftwareContext:
 
         What becomes of it starts the callback of the client.
         """
-        goal_id = client.new_goal_id()
+        goal, goal_id = client.copy(goal), client.new_goal_id()
         self.sends.append(lambda _: client.send_goal(goal, goal_id))
         return goal_id
 
