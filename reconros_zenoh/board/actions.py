@@ -12,6 +12,7 @@ from reconros_zenoh.board.stack_node import StackNode
 from reconros_zenoh.errors import BadMessageError
 from reconros_zenoh.rmw.action_client import ActionClient
 from reconros_zenoh.rmw.action_server import ActionServer
+from reconros_zenoh.ros.message_arrays import snapshot
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -128,6 +129,14 @@ class ActionClientSource:
     def new_goal_id(self) -> bytes:
         """Return the id of a new goal: 16 bytes; callable from any thread."""
         return self._client.new_goal_id()
+
+    def copy(self, goal: object) -> object:
+        """Return the goal as it is now; callable from any thread.
+
+        Raises UsageError when it is not of the action's type.
+        """
+        self._type.goal.encode(goal, joined_at_once=True)
+        return snapshot(goal)
 
     def send_goal(self, goal: object, goal_id: bytes) -> None:
         """Send a goal; called by the event loop. Raises UsageError when it is not of the action's type."""

@@ -67,6 +67,10 @@ class AddressSpace:
         block, offset = self._find(address, size)
         return block.content[offset : offset + size]
 
+    def start(self, address: int) -> int:
+        """Return where the block begins in which this address lies; raise UnmappedError where none is."""
+        return address - self._find(address, 0)[1]
+
     def write(self, address: int, data: NDArray[np.uint8]) -> None:
         """Change the bytes from this address on; raise UnmappedError unless they lie in one block."""
         block, offset = self._find(address, len(data))
@@ -157,6 +161,10 @@ class PlacedMessage:
     def load(self) -> Any:
         """Return the message as it stands in memory now."""
         return self._space.load(self.message_type, self.address)
+
+    def holds(self, address: int) -> bool:
+        """Tell whether the block at this address is one of the message; UnmappedError where none is."""
+        return self._space.start(address) in self._mapped
 
     def unmap(self) -> None:
         """Take it out of memory."""

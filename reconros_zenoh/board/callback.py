@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar, overload
 
 import numpy as np
@@ -14,6 +14,7 @@ from reconros_zenoh.board.host import measured
 from reconros_zenoh.board.timing import cycles_ns
 from reconros_zenoh.errors import PageFaultError
 from reconros_zenoh.ros.c_layout import is_number, number
+from reconros_zenoh.ros.message_arrays import arrays_of, lies_in
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator
@@ -23,10 +24,10 @@ if TYPE_CHECKING:
     from reconros_zenoh.board.actions import ActionClientSource
     from reconros_zenoh.board.bitstream import Bitstream
     from reconros_zenoh.board.board import Board
+    from reconros_zenoh.board.clients import ClientSource
     from reconros_zenoh.board.endpoints import Event, MessageWriter
     from reconros_zenoh.board.host import Limit
     from reconros_zenoh.board.slots import ReconfigurableSlot
-    from reconros_zenoh.board.software import Outlet
     from reconros_zenoh.board.timing import ExecutionTime
     from reconros_zenoh.clock.activity import Awaitable
     from reconros_zenoh.rmw.action_server import GoalHandle
@@ -94,11 +95,24 @@ class InitData:
             message_type = message_type.nested(str(dict(message_type.fields)[name][1]))
         form = dict(message_type.fields)[last]
         dtype = number(form) if is_number(form) else None
-        return np.atleast_1d(np.asarray(getattr(message, last), dtype))
+        array = np.atleast_1d(np.asarray(getattr(message, last), dtype))
+        self._arrays.append(array)
+        return array
 
     def in_memory(self) -> Any:
         """Return the message as it stands in memory: with what the callback has written."""
         return self.message if self._placed is None else self._placed.load()
+
+    def holds(self, source: Array | int) -> bool:
+        """Tell whether all of an array, or of the block at an address, belongs to this message."""
+        if not isinstance(source, np.ndarray):
+            return self._placed is not None and self._placed.holds(source)
+        return any(lies_in(source, array) for array in self._arrays)
+
+    @cached_property
+    def _arrays(self) -> list[Array]:
+        """The arrays of the message, and those that were made of its other fields."""
+        return list(arrays_of(self.message))
 
     def release(self) -> None:
         """Take the struct out of memory."""
@@ -112,6 +126,7 @@ class HardwareThread(DelegateCalls):
 
     A hardware callback is a generator over it, written like the listings of the paper:
     `image = yield from thread.mem_read(message.data)`. Every call is charged in the model.
+    `sequence_number` is as in a `SoftwareContext`: it came with the init data.
     Source: ReconROS Executor, Section IV, Listings 2 and 3.
     """
 
@@ -130,6 +145,7 @@ class HardwareThread(DelegateCalls):
         self._slot = slot
         self._time = implementation.time
         self._limit = implementation.limit
+        self.sequence_number = event.sequence_number
         self._in_slot = event.in_slot
         self._message = (
             event.message
@@ -168,16 +184,18 @@ class HardwareThread(DelegateCalls):
         """Return the array once it has come from main memory into the slot: MEM_READ.
 
         The source is an array, such as a field of the message, or an address: then `size` bytes from there on
-        come as numbers of `dtype`. What came over a hardware-mapped topic is in the slot already. Raises
-        PageFaultError for bytes that are not all in one block of memory.
+        come as numbers of `dtype`. A message that came over a hardware-mapped topic is in the slot already:
+        its arrays, views of them, and its blocks at their addresses cost nothing, copies and all else do.
+        Raises PageFaultError for bytes that are not all in one block of memory.
         """
         if isinstance(source, np.ndarray):
             data: Array = source
         else:
             assert size is not None
+            source = int(source)
             # What the slot holds does not change with the memory.
-            data = self._mapped(int(source), size).view(dtype).copy()
-        if not self._in_slot:
+            data = self._mapped(source, size).view(dtype).copy()
+        if not (self._in_slot and isinstance(self._message, InitData) and self._message.holds(source)):
             yield from self._board.memif.transfer(data.nbytes)
             self._timeline.mark("memif")
         return data
@@ -233,10 +251,15 @@ class HardwareThread(DelegateCalls):
             message = self._in_memory(message)
         yield from writer.publish(message, self._osif, self._timeline)
 
-    def call(self, client: Outlet, request: object) -> Generator[Awaitable, object, None]:
-        """Call a service through the delegate; its response starts a CLT callback."""
+    def call(self, client: ClientSource, request: object) -> Generator[Awaitable, object, int]:
+        """Call a service through the delegate and return the call's sequence number.
+
+        Its response starts a CLT callback.
+        """
         yield from self._call()
-        client.send(client.encode(request), self._timeline.fork())
+        parts, sequence_number = client.encode(request), client.next_sequence_number()
+        client.send(parts, sequence_number, self._timeline.fork())
+        return sequence_number
 
     def send_goal(self, client: ActionClientSource, goal: object) -> Generator[Awaitable, object, bytes]:
         """Send the goal through the delegate and return its id; what becomes of it starts a CLT callback."""

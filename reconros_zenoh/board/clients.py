@@ -29,7 +29,9 @@ class ClientSource(Reader):
     """A service client: callbacks call with it, and it is ready while a response waits.
 
     The callback gets each response as its message, and None for a call that the server refused or did not
-    answer within `timeout_ns`, which is logged. Responses come in the order in which they arrive.
+    answer within `timeout_ns`: the first of them since the last response is logged, `unanswered` counts them.
+    Responses come in the order in which they arrive; each call has a `sequence_number`, which stands on the
+    wire as in ROS 2. Of calls that wait to be sent the last 10 are kept, of responses as well.
     """
 
     def __init__(
@@ -45,7 +47,13 @@ class ClientSource(Reader):
         self._writer = Writer(board, QosProfile())
         self._timeout_ns = timeout_ns
         self._check: Callable[[Any], None] | None = None
+        self._is_answered = True
         self.unanswered = 0
+
+    @property
+    def dropped(self) -> int:
+        """How many calls and responses were pushed out by newer ones."""
+        return super().dropped + self._writer.dropped
 
     def open(self, on_ready: Callable[[], None], check: Callable[[Any], None] | None) -> None:
         """Begin to hand out responses; one that `check` refuses counts as not answered."""
@@ -60,25 +68,42 @@ class ClientSource(Reader):
         """Return the request as it goes over the wire; callable from any thread."""
         return self._client.service_type.request.encode(request)
 
-    def send(self, parts: Parts, timeline: Timeline) -> None:
+    def next_sequence_number(self) -> int:
+        """Return the number of the next call; callable from any thread."""
+        return self._client.next_sequence_number()
+
+    def send(self, parts: Parts, sequence_number: int, timeline: Timeline) -> None:
         """Call the service with an encoded request."""
-        call = partial(self._client.call_encoded, parts, self._on_response, self._timeout_ns)
+        on_response = partial(self._on_response, sequence_number)
+        call = partial(
+            self._client.call_encoded, parts, on_response, self._timeout_ns, sequence_number=sequence_number
+        )
         self._writer.put(parts, timeline, call)
 
-    def _on_response(self, response: Received | BadMessageError | TransportError) -> None:
+    def _on_response(
+        self, sequence_number: int, response: Received | BadMessageError | TransportError
+    ) -> None:
         if isinstance(response, Received):
             try:
                 if self._check is not None:
                     self._check(response.message)
             except BadMessageError as error:
                 self._client.context.rejections.add(self._client.key, None, error)
-                self._board.environment.post(self._give_up, error)
+                self._board.environment.post(self._give_up, sequence_number, error)
             else:
+                self._is_answered = True
                 self.arrive(response)
         else:
-            self._board.environment.post(self._give_up, response)
+            self._board.environment.post(self._give_up, sequence_number, response)
 
-    def _give_up(self, reason: BadMessageError | TransportError) -> None:
+    def _give_up(self, sequence_number: int, reason: BadMessageError | TransportError) -> None:
         self.unanswered += 1
-        _log.warning("a call of service %s has no answer: %s", self._client.name, reason)
-        self.enqueue(Event(None, Timeline(self._board.environment, self._board.environment.now)))
+        if self._is_answered:
+            self._is_answered = False
+            _log.warning(
+                "a call of service %s has no answer: %s; until one has, this is not reported again",
+                self._client.name,
+                reason,
+            )
+        timeline = Timeline(self._board.environment, self._board.environment.now)
+        self.enqueue(Event(None, timeline, sequence_number=sequence_number))

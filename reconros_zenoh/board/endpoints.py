@@ -33,8 +33,9 @@ class Event:
 
     `message_type` is None for what has no place in memory as a C struct. `in_slot`: it came over a
     hardware-mapped topic, so a slot need not read it from main memory. `size` is that of a subscription's
-    message in bytes on the wire. `lasting`: how long its callback takes depends on other events, as that of a
-    goal on being canceled.
+    message in bytes on the wire, `publisher` the gid of who sent it, `sequence_number` that of the call which
+    a response, or its absence, belongs to. `lasting`: how long its callback takes depends on other events, as
+    that of a goal on being canceled.
     """
 
     message: Any
@@ -43,6 +44,8 @@ class Event:
     message_type: MessageType | None = None
     in_slot: bool = False
     size: int = 0
+    publisher: bytes = b""
+    sequence_number: int | None = None
     lasting: bool = False
 
 
@@ -153,8 +156,17 @@ class Reader:
     def _receive(self, incoming: _Incoming) -> Generator[Awaitable, object, None]:
         received, timeline, way = incoming
         if (yield from way):
-            message, size = received.message, received.size
-            self.enqueue(Event(message, timeline, received.responder, self._message_type, size=size))
+            self.enqueue(
+                Event(
+                    received.message,
+                    timeline,
+                    received.responder,
+                    self._message_type,
+                    size=received.size,
+                    publisher=received.publisher,
+                    sequence_number=received.sequence_number,
+                )
+            )
         else:
             self._lost += 1
 

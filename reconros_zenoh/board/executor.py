@@ -4,19 +4,20 @@ from __future__ import annotations
 
 import logging
 import math
-from collections import Counter
+from collections import Counter, defaultdict
 from dataclasses import dataclass, field
 from functools import partial
 from typing import TYPE_CHECKING, Any, Literal
 
 from reconros_zenoh.board.bitstream import Bitstream, read_bitstreams
 from reconros_zenoh.board.callback import HardwareImplementation
+from reconros_zenoh.board.failures import Failures
 from reconros_zenoh.board.hmt import HmtSource
 from reconros_zenoh.board.host import Limit
 from reconros_zenoh.board.software import SoftwareImplementation
 from reconros_zenoh.board.timing import hardware_time, software_time
 from reconros_zenoh.board.workers import HardwareWorker, SoftwareWorker
-from reconros_zenoh.errors import UsageError
+from reconros_zenoh.errors import BadMessageError, UsageError
 from reconros_zenoh.executor.callbacks import CallbackEntry, CallbackKind
 from reconros_zenoh.executor.reconros import ReconrosExecutor
 from reconros_zenoh.executor.resource_mask import ResourceMask
@@ -96,6 +97,7 @@ class Executor:
         self._poll_jitter = model.executor.poll_jitter.share if model else 0.0
         self.calls: Counter[str] = Counter()
         self.failures: Counter[str] = Counter()
+        self._ways_to_fail: defaultdict[str, Failures] = defaultdict(Failures)
 
     def add_sw_callback(
         self,
@@ -109,6 +111,7 @@ class Executor:
     ) -> None:
         """Let the callback `name` run as a function; `check` raises BadMessageError for bad messages.
 
+        A message whose check raises anything else is refused as well, with the reason `check_failed`.
         How long it takes says `timing`, or without it the table of the profile. A call that takes longer than
         `limit_ms` is failed and its worker goes on; what its function still does is not heard of.
         """
@@ -180,7 +183,8 @@ class Executor:
         for entry in self._policy.callbacks:
             self._workers_of[entry.name] = [worker for worker in workers if worker.resource in entry.mask]
             registration = self._registrations[entry.name]
-            registration.source.open(partial(self._became_ready, entry), registration.check)
+            check = registration.check and partial(_check_message, entry.name, registration.check)
+            registration.source.open(partial(self._became_ready, entry), check)
 
     def select(self, worker: Worker, resource: int) -> Dispatch | None:
         """Return the callback that this worker must run now, its message taken, or None."""
@@ -195,11 +199,21 @@ class Executor:
         self._finish(dispatch)
 
     def fail(self, dispatch: Dispatch, event: Event, error: BaseException) -> None:
-        """Note that the callback raised: it is logged and counted, and the sender of a request is told."""
+        """Note that the callback raised: it is counted, and the sender of a request is told.
+
+        The first error of a type and place is logged with its traceback.
+        """
         name = dispatch.entry.name
         self.failures[name] += 1
-        spans = ", ".join(f"{stage} {ns / 1e6:g} ms" for stage, ns in event.timeline.stages_ns.items() if ns)
-        _log.error("callback %s failed after %s", name, spans or "0 ms", exc_info=error)
+        if self._ways_to_fail[name].is_new(error):
+            stages = event.timeline.stages_ns.items()
+            spans = ", ".join(f"{stage} {ns / 1e6:g} ms" for stage, ns in stages if ns)
+            _log.error(
+                "callback %s failed after %s; a failure of this kind is not reported again",
+                name,
+                spans or "0 ms",
+                exc_info=error,
+            )
         if event.responder is not None:
             event.responder.fail(f"callback {name} failed: {error}")
         self._finish(dispatch)
@@ -256,6 +270,18 @@ class Executor:
 def _check_function(callback: str, function: object) -> None:
     if not callable(function):
         raise UsageError(f"callback {callback!r} is {function!r}, which cannot be called. Give a function.")
+
+
+def _check_message(callback: str, check: Callable[[Any], None], message: object) -> None:
+    """Refuse the message also where the check itself fails: that must harm neither sender nor board."""
+    try:
+        check(message)
+    except BadMessageError:
+        raise
+    except (Exception, SystemExit) as error:
+        raise BadMessageError(
+            "check_failed", f"the check of callback {callback} failed: {error!r}"
+        ) from error
 
 
 def _limit(callback: str, limit_ms: float | None) -> Limit | None:

@@ -116,14 +116,15 @@ class Gateway:
 
     def _write_hmt(self, event: Event) -> Generator[Awaitable, object, None]:
         event.timeline.mark("gateway")
+        sender = event.publisher.hex()
         read = Signal()
         Activity(self._read(event.size, read))
         try:
-            yield from self._topic.publish(self, event.message, event.size, event.timeline)
+            yield from self._topic.publish(self, event.message, event.size, event.timeline, sender)
             self.to_hmt += 1
         except BadMessageError as error:
             self.refused += 1
-            self._board.context.rejections.add(self._topic.key, None, error)
+            self._board.context.rejections.add(self._topic.key, sender, error)
         if read.callbacks is not None:
             yield read
 

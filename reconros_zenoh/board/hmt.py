@@ -14,6 +14,7 @@ from reconros_zenoh.board.endpoints import Event
 from reconros_zenoh.board.stream import Stream
 from reconros_zenoh.clock.activity import Signal
 from reconros_zenoh.errors import BadMessageError, UsageError
+from reconros_zenoh.ros.message_arrays import snapshot
 from reconros_zenoh.ros.qos import QosProfile
 
 if TYPE_CHECKING:
@@ -52,7 +53,11 @@ class FifoPlan:
 
 
 class Streamed(NamedTuple):
-    """A message on its way over a stream; `complete` fires when its last word is there."""
+    """A message on its way over a stream; `complete` fires when its last word is there.
+
+    `publisher` wrote it to the stream, for the filters; `sender` sent it first, for the log: the gid in
+    hexadecimal of who published it in software, or the name of the hardware callback.
+    """
 
     publisher: Hashable
     message: Any
@@ -60,6 +65,7 @@ class Streamed(NamedTuple):
     targets: list[Fifo]
     timeline: Timeline
     complete: Signal
+    sender: str | None
 
 
 class Fifo:
@@ -136,8 +142,8 @@ class HardwareTopic:
     One message passes at a time, to all subscribers at once, in the order in which publishers found room: one
     that has to wait does not keep another from passing, or a gateway that is about to write could not go on
     to read. A publisher publishes one message at a time. A message takes its size through the stream's
-    bandwidth; bodies are handed over by reference. `overhead_ns` is what a subscribing slot needs to take a
-    message over.
+    bandwidth; bodies, which must not change any more, are handed over by reference. `overhead_ns` is what a
+    subscribing slot needs to take a message over.
     """
 
     def __init__(self, board: Board, topic: str, message_type: MessageType) -> None:
@@ -184,9 +190,9 @@ class HardwareTopic:
         self._tap = Stream(put, QosProfile().depth)
 
     def publish(
-        self, publisher: Hashable, message: Any, size: int, timeline: Timeline
+        self, publisher: Hashable, message: Any, size: int, timeline: Timeline, sender: str | None = None
     ) -> Generator[Awaitable, object, None]:
-        """Return when the message of `size` bytes on the wire has passed.
+        """Return when the message of `size` bytes on the wire has passed; `sender` as in `Streamed`.
 
         Raise BadMessageError when it is larger than somebody's FIFO.
         """
@@ -203,7 +209,7 @@ class HardwareTopic:
             yield full.room
         # All places at once: who held one while waiting for another could keep a third from going on.
         targets = [fifo for fifo in fifos if fifo.reserve()]
-        streamed = Streamed(publisher, message, size, targets, timeline, Signal())
+        streamed = Streamed(publisher, message, size, targets, timeline, Signal(), sender)
         self._passages.put(streamed)
         if streamed.complete.callbacks is not None:
             yield streamed.complete
@@ -273,7 +279,7 @@ class HmtSource:
         except BadMessageError as error:
             bad = self._fifo.messages.pop()
             self._fifo.release()
-            self._board.context.rejections.add(self._topic.key, str(bad.publisher), error)
+            self._board.context.rejections.add(self._topic.key, bad.sender, error)
             return
         self._on_ready()
 
@@ -300,7 +306,11 @@ class HmtWriter:
         """Do nothing: `encode` has raised."""
 
     def publish(self, message: object, osif: Osif, timeline: Timeline) -> Generator[Awaitable, object, None]:  # noqa: ARG002
-        """Return when the message has passed the stream, after waiting for room where a FIFO blocks."""
-        size = sum(map(len, self._topic.type.encode(message)))
-        yield from self._topic.publish(self, message, size, timeline.fork())
+        """Return when the message has passed the stream, after waiting for room where a FIFO blocks.
+
+        Subscribers get the message as it is now; what the callback does with it afterwards is its own affair.
+        """
+        size = sum(map(len, self._topic.type.encode(message, joined_at_once=True)))
+        message = snapshot(message)
+        yield from self._topic.publish(self, message, size, timeline.fork(), timeline.callback)
         timeline.mark("hmt")

@@ -15,6 +15,7 @@ import xxhash
 
 from reconros_zenoh.board.thread_pool import ThreadPool
 from reconros_zenoh.errors import CallbackLimitError
+from reconros_zenoh.ros.message_arrays import snapshot
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator
@@ -156,9 +157,12 @@ class Host:
             self.overruns.total_ns += late_ns
 
     def compute(self, kernel: Callable[..., R], *arguments: object) -> R:
-        """Return `kernel(*arguments)` of a pure kernel; called in the thread of a started computation."""
+        """Return `kernel(*arguments)` of a pure kernel; called in the thread of a started computation.
+
+        Arrays that it returns are read-only: in virtual time others may get the same ones.
+        """
         if self._pool is not None:
-            return kernel(*arguments)
+            return _frozen(kernel(*arguments), arguments)
         return _results.of(kernel, *arguments)
 
     def close(self) -> None:
@@ -184,6 +188,18 @@ def measured(function: Callable[..., R], *arguments: object) -> tuple[R, int]:
     return function(*arguments), time.perf_counter_ns() - started_ns
 
 
+def _frozen(result: R, arguments: tuple[object, ...]) -> R:
+    """Return a result whose arrays nobody can change; one that the kernel has made need not be copied."""
+    if type(result) is tuple:
+        elements = cast("tuple[object, ...]", result)
+        return cast("R", tuple(_frozen(element, arguments) for element in elements))
+    if not isinstance(result, np.ndarray):
+        return result
+    if result.base is None and all(result is not argument for argument in arguments):
+        result.flags.writeable = False
+    return cast("R", snapshot(result))
+
+
 class _Results:
     """The results of pure kernels that were asked for last."""
 
@@ -192,13 +208,17 @@ class _Results:
         self._lock = threading.Lock()
 
     def of(self, kernel: Callable[..., R], *arguments: object) -> R:
-        """Return `kernel(*arguments)`, computed unless it is known."""
+        """Return `kernel(*arguments)`, computed unless it is known; it never is for a list or a message."""
         key = (kernel, *(_identity(argument) for argument in arguments))
+        try:
+            hash(key)
+        except TypeError:
+            return _frozen(kernel(*arguments), arguments)
         with self._lock:
             if key in self._kept:
                 self._kept.move_to_end(key)
                 return self._kept[key]  # type: ignore[return-value] # stored below under the same kernel
-        result = kernel(*arguments)
+        result = _frozen(kernel(*arguments), arguments)
         with self._lock:
             self._kept[key] = result
             if len(self._kept) > _RESULTS_KEPT:
@@ -225,10 +245,13 @@ class _Unchanging:
 
 
 def _identity(argument: object) -> object:
-    """Return something equal for equal arguments: arrays by shape, type and a hash of their content."""
+    """Return something equal for equal arguments: arrays by shape, type and a hash of their content.
+
+    Numbers of different types are different, as a kernel may overflow with one of them.
+    """
     if isinstance(argument, np.ndarray):
         if argument.base is None and not argument.flags.writeable:
             return _Unchanging(argument)
         content = np.ascontiguousarray(argument)
         return argument.shape, argument.dtype.str, xxhash.xxh3_128_digest(content.data)
-    return argument
+    return type(argument), argument

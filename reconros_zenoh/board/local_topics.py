@@ -15,6 +15,7 @@ from reconros_zenoh.board.endpoints import TopicWriter
 from reconros_zenoh.board.stream import Stream
 from reconros_zenoh.rmw.received import Received
 from reconros_zenoh.ros.graph import EndpointKind, EndpointToken, parse, tokens_expression
+from reconros_zenoh.ros.message_arrays import snapshot
 from reconros_zenoh.ros.names import data_key
 from reconros_zenoh.ros.qos import QosProfile
 
@@ -125,7 +126,7 @@ class _Sent(NamedTuple):
 class LocalTopicWriter(TopicWriter):
     """A publisher of a board that knows what its own topics cost; stack and link only for readers elsewhere.
 
-    Bodies are handed over by reference, so a message must not change once it is published.
+    All readers get one copy of the message as it was when it was published; its arrays are read-only.
     """
 
     def __init__(
@@ -152,7 +153,8 @@ class LocalTopicWriter(TopicWriter):
         return super().dropped + self._publications.dropped
 
     def encode(self, message: object) -> Any:
-        """Return the message, and how it goes over the wire; callable from any thread."""
+        """Return a copy of the message, and how it goes over the wire; callable from any thread."""
+        message = snapshot(message)
         return message, super().encode(message)
 
     def send(self, encoded: Any, timeline: Timeline) -> None:
@@ -163,7 +165,8 @@ class LocalTopicWriter(TopicWriter):
     def publish(self, message: object, osif: Osif, timeline: Timeline) -> Generator[Awaitable, object, None]:
         """Return when the delegate has published; its call is part of what a publication costs."""
         osif.calls += 1
-        yield from self._publish(_Sent(message, super().encode(message), timeline.fork()), hardware=True)
+        message, parts = self.encode(message)
+        yield from self._publish(_Sent(message, parts, timeline.fork()), hardware=True)
         timeline.mark("osif")
 
     def _publish_from_software(self, sent: _Sent) -> Generator[Awaitable, object, None]:

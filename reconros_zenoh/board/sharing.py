@@ -73,7 +73,7 @@ class SharedResource:
             self._plan(job, job.limit)
         try:
             yield job
-        except Exception:  # the caller is stopped
+        except BaseException:  # the caller is stopped, or closed
             job.due_ns = None
             self._jobs.remove(job)
             self._share()

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import logging
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any, Protocol, TypeAlias, TypeVar
+
+from reconros_zenoh.errors import CallbackError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from reconros_zenoh.board.actions import ActionClientSource
     from reconros_zenoh.board.board import Board
+    from reconros_zenoh.board.clients import ClientSource
     from reconros_zenoh.board.host import Limit
     from reconros_zenoh.board.os_resources import Condition, Mailbox, Mutex, Semaphore
     from reconros_zenoh.board.spans import Timeline
@@ -34,7 +38,7 @@ class SoftwareImplementation:
 
 
 class Outlet(Protocol):
-    """Where a callback sends messages: a publisher, or a client of a service or action."""
+    """Where a callback publishes messages."""
 
     def encode(self, message: object) -> Parts:
         """Return the message as it goes over the wire; callable from any thread."""
@@ -47,15 +51,19 @@ class SoftwareContext:
     """What a software callback can do besides computing; it belongs to one call of it, in one thread.
 
     `log` is the callback's logger, `started_ns` the time on the board's clock at which the callback began.
+    `sequence_number` says which call the response belongs to that started a service client's callback; it is
+    what `call` has returned then, and None for all other callbacks.
     """
 
-    def __init__(self, board: Board, callback: str, time: ExecutionTime) -> None:
+    def __init__(self, board: Board, callback: str, time: ExecutionTime, sequence_number: int | None) -> None:
         self._board = board
         self._callback = callback
         self.started_ns = board.environment.now
+        self.sequence_number = sequence_number
         # What is measured is really computed each time.
         self._really = time.ns is None and time.modelled
         self._mutexes: dict[Mutex, None] = {}
+        self._is_over = False
         self.sends: list[Callable[[Timeline], object]] = []
 
     @property
@@ -78,16 +86,21 @@ class SoftwareContext:
         """Publish the message once the callback has run to completion."""
         self.sends.append(partial(writer.send, writer.encode(message)))
 
-    def call(self, client: Outlet, request: object) -> None:
-        """Call the service once the callback has run to completion; its response starts a CLT callback."""
-        self.publish(client, request)
+    def call(self, client: ClientSource, request: object) -> int:
+        """Call the service once the callback has run to completion, and return the call's sequence number.
+
+        Its response starts a CLT callback.
+        """
+        parts, sequence_number = client.encode(request), client.next_sequence_number()
+        self.sends.append(partial(client.send, parts, sequence_number))
+        return sequence_number
 
     def send_goal(self, client: ActionClientSource, goal: object) -> bytes:
         """Send the goal once the callback has run to completion, and return its id.
 
         What becomes of it starts the callback of the client.
         """
-        goal_id = client.new_goal_id()
+        goal, goal_id = client.copy(goal), client.new_goal_id()
         self.sends.append(lambda _: client.send_goal(goal, goal_id))
         return goal_id
 
@@ -104,9 +117,17 @@ class SoftwareContext:
         return mailbox.try_put(word)
 
     def mutex_trylock(self, mutex: Mutex) -> bool:
-        """Hold the mutex, until the callback ends at the latest, and return True; or return False."""
+        """Hold the mutex, until the callback ends at the latest, and return True; or return False.
+
+        Raises CallbackError in a function that runs on although its call is over its limit.
+        """
         self._mutexes[mutex] = None
-        return mutex.try_lock(self)
+        locked = mutex.try_lock(self)
+        # Asked after it is locked: either this sees that the call is over, or its end sees the mutex.
+        if self._is_over:
+            self._release(mutex)
+            raise CallbackError(f"callback {self._callback} is over its limit: it gets no mutex any more.")
+        return locked
 
     def mutex_unlock(self, mutex: Mutex) -> None:
         """Let others have the mutex."""
@@ -130,6 +151,12 @@ class SoftwareContext:
 
     def release_mutexes(self) -> None:
         """Let others have every mutex that is still held: the call has ended, maybe with an error."""
-        for mutex in self._mutexes:
-            if mutex.is_held_by(self):
-                mutex.unlock(self)
+        self._is_over = True
+        for mutex in list(self._mutexes):
+            self._release(mutex)
+
+    def _release(self, mutex: Mutex) -> None:
+        with suppress(
+            CallbackError
+        ):  # it is not held, or its holder has just given it back in another thread
+            mutex.unlock(self)

@@ -33,6 +33,7 @@ class Arrived(NamedTuple):
     size: int
     transit_ns: int
     responder: Responder | None
+    publisher: bytes
     timeline: Timeline
 
 
@@ -52,6 +53,11 @@ class StackNode:
     def context(self) -> Context:
         """The session of the node."""
         return self._node.context
+
+    @property
+    def fully_qualified_name(self) -> str:
+        """The name of the node behind its namespace."""
+        return self._node.fully_qualified_name
 
     def publisher(self, message_type: MessageType, topic: str, qos: QosProfile) -> StackPublisher:
         """Return a new publisher."""
@@ -102,7 +108,14 @@ class Arrivals:
         timeline = Timeline(environment, environment.now - received.transit_ns)
         timeline.callback = self._label
         self._stream.put(
-            Arrived(received.message, received.size, received.transit_ns, received.responder, timeline)
+            Arrived(
+                received.message,
+                received.size,
+                received.transit_ns,
+                received.responder,
+                received.publisher,
+                timeline,
+            )
         )
 
     def _receive(self, arrived: Arrived) -> Generator[Awaitable, object, None]:

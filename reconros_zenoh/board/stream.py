@@ -6,6 +6,7 @@ import logging
 from collections import deque
 from typing import TYPE_CHECKING, Generic, TypeVar
 
+from reconros_zenoh.board.failures import Failures
 from reconros_zenoh.clock.activity import PARK, Activity
 
 if TYPE_CHECKING:
@@ -21,7 +22,8 @@ class Stream(Generic[T]):
     """Hands items to a process in order: the next when it is done with the one before.
 
     At most `depth` wait (None: any number); a further one pushes the oldest out (KEEP_LAST). `dropped` counts
-    what was pushed out, and the items whose process raised: that is logged, and the stream goes on.
+    what was pushed out, and the items whose process raised: the first error of a type and place is logged,
+    and the stream goes on.
     """
 
     def __init__(
@@ -30,6 +32,7 @@ class Stream(Generic[T]):
         self._process = process
         self._waiting: deque[T] = deque(maxlen=depth)
         self.dropped = 0
+        self._ways_to_fail = Failures()
         self._activity = Activity(self._run())
 
     def put(self, item: T) -> None:
@@ -44,7 +47,11 @@ class Stream(Generic[T]):
             while self._waiting:
                 try:
                     yield from self._process(self._waiting.popleft())
-                except Exception:  # noqa: BLE001 - one message must not end the stream
+                except Exception as error:  # noqa: BLE001 - one message must not end the stream
                     self.dropped += 1
-                    _log.exception("a message was lost on its way through the board")
+                    if self._ways_to_fail.is_new(error):
+                        _log.exception(
+                            "a message was lost on its way through the board; a loss of this kind is not "
+                            "reported again"
+                        )
             yield PARK

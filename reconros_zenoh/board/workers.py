@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Generator
 from typing import TYPE_CHECKING, cast
 
 from reconros_zenoh.board.callback import HardwareThread, ThreadExit
@@ -12,8 +13,6 @@ from reconros_zenoh.clock.activity import PARK, Activity, Signal, limited
 from reconros_zenoh.executor.resource_mask import SOFTWARE
 
 if TYPE_CHECKING:
-    from collections.abc import Generator
-
     from reconros_zenoh.board.callback import HardwareImplementation
     from reconros_zenoh.board.endpoints import Event
     from reconros_zenoh.board.executor import Executor
@@ -94,7 +93,7 @@ class SoftwareWorker(Worker):
         yield from board.cpu.run(self._executor.dispatch_ns)
         timeline.mark("dispatch")
         implementation = cast("SoftwareImplementation", dispatch.implementation)
-        context = SoftwareContext(board, dispatch.entry.name, implementation.time)
+        context = SoftwareContext(board, dispatch.entry.name, implementation.time, event.sequence_number)
         try:
             response = yield from self._within(
                 implementation.limit, self._run_function(implementation, event, context)
@@ -148,7 +147,13 @@ class HardwareWorker(Worker):
         thread = HardwareThread(board, dispatch.entry.name, self._slot, event, implementation)
         try:
             try:
-                response = yield from self._within(implementation.limit, implementation.callback(thread))
+                steps = implementation.callback(thread)
+                if not isinstance(steps, Generator):
+                    raise TypeError(
+                        f"a hardware callback is a generator, this one returned {steps!r}. "
+                        "Call what takes time with `yield from`."
+                    )
+                response = yield from self._within(implementation.limit, steps)
             except ThreadExit as end:
                 response = end.response
             if event.responder is not None:

@@ -46,13 +46,15 @@ def limited(
     """Return what the steps return; when the deadline happens before they end, raise the error in them.
 
     They may wait once more to put things in order; then they are closed. Steps that never wait cannot be
-    stopped.
+    stopped. What they yield that cannot be waited for is refused as an `Activity` does.
     """
     failure: Exception | None = None
     in_order = False
     try:
-        waited_for = next(steps)
+        waited_for: Awaitable | _Refused = next(steps)
         while True:
+            if not hasattr(waited_for, "callbacks"):
+                waited_for = _Refused(waited_for)
             if waited_for.callbacks is not None and deadline.callbacks is not None:
                 yield _first(waited_for, deadline)
             if waited_for.callbacks is not None:

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import signal
-import threading
-from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 import simpy
 from simpy.events import URGENT
 
+from reconros_zenoh.clock.signals import handled_between_events
+
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable
 
 
 class VirtualEnvironment(simpy.Environment):
@@ -35,10 +34,9 @@ class VirtualEnvironment(simpy.Environment):
     def run(self, until: float | simpy.Event | None = None) -> Any:
         """Run until that time [ns], that event, or the end of all events; see `simpy.Environment.run`.
 
-        A handler of SIGINT or SIGTERM (Python's raises KeyboardInterrupt) is called between two events: what
-        it raises somewhere in the model could be lost in a finalizer. A second signal is handled at once.
+        Ctrl-C raises KeyboardInterrupt between two events.
         """
-        with self._signals_between_events():
+        with handled_between_events(self._call_next):
             return super().run(until)
 
     def post(self, function: Callable[..., object], *arguments: object) -> None:
@@ -49,42 +47,15 @@ class VirtualEnvironment(simpy.Environment):
         """Have `function(*arguments)` called by the event loop after `delay_ns`, which is not negative."""
         if delay_ns < 0:
             raise ValueError(f"Negative delay {delay_ns}")
+        # It has what the event loop asks of an event.
         self.schedule(_Call(function, arguments), delay=delay_ns)  # type: ignore[arg-type]
 
-    @contextmanager
-    def _signals_between_events(self) -> Iterator[None]:
-        handlers: dict[int, Callable[..., object]] = {}
-        received: list[tuple[int, object]] = []
-
-        def receive(number: int, frame: object) -> None:
-            signal.signal(number, cast("Any", handlers[number]))
-            received.append((number, frame))
-            self.schedule(_Call(handle, ()), URGENT)  # type: ignore[arg-type]
-
-        def handle() -> None:
-            while received:
-                number, frame = received.pop()
-                handlers[number](number, frame)
-
-        if threading.current_thread() is threading.main_thread():
-            for number in (signal.SIGINT, signal.SIGTERM):
-                handler = signal.getsignal(number)
-                if callable(handler):
-                    handlers[number] = handler
-                    signal.signal(number, receive)
-        try:
-            yield
-        finally:
-            for taken, former in handlers.items():
-                signal.signal(taken, cast("Any", former))
-            handle()  # what came after the last event
+    def _call_next(self, function: Callable[[], None]) -> None:
+        self.schedule(_Call(function, ()), URGENT)  # type: ignore[arg-type] # as in call_later
 
 
 class _Call:
-    """A call that is due at some time: it has what the event loop asks of an event, at half the cost of one.
-
-    Its only callback is itself.
-    """
+    """A call that is due at some time: an event whose only callback is itself, at half the cost of one."""
 
     __slots__ = ("_arguments", "_function", "callbacks")
     _ok = True

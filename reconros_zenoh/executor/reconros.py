@@ -52,6 +52,8 @@ class ReconrosExecutor:
 
     def __init__(self) -> None:
         self.callbacks = CallbackLists()
+        self._timers = self.callbacks[CallbackKind.TMR]
+        self._others = [self.callbacks[kind] for kind in _WITH_POSITION]
         self._offsets: dict[object, OffsetVector] = {}
 
     def add(self, entry: CallbackEntry) -> None:
@@ -64,27 +66,24 @@ class ReconrosExecutor:
 
     def select(self, worker: object, resource: int) -> Dispatch | None:
         """Return the callback that this worker of `resource` must run now, or None when none is ready."""
-        timers = self.callbacks[CallbackKind.TMR].ready(resource)
+        timers = self._timers.ready(resource)
         if timers:
-            return self._take(CallbackKind.TMR, lowest(timers), resource)
+            return self.callbacks.take(self._timers[lowest(timers)], resource)
         offsets = self._offsets.get(worker)
         if offsets is None:
             offsets = self._offsets[worker] = OffsetVector(self.callbacks)
-        ready = [(kind, self.callbacks[kind].ready(resource)) for kind in _WITH_POSITION]
-        if not any(entries for _, entries in ready):
+        ready = [entries.ready(resource) for entries in self._others]
+        if not any(ready):
             offsets.wrap()
             return None
         # Twice: the first round may only have wrapped every Position.
         for _ in range(2):
-            for kind, entries in ready:
-                index = offsets.search(kind, entries)
+            for kind, entries, bits in zip(_WITH_POSITION, self._others, ready, strict=True):
+                index = offsets.search(kind, bits)
                 if index is not None:
-                    return self._take(kind, index, resource)
+                    return self.callbacks.take(entries[index], resource)
         return None
 
     def finish(self, dispatch: Dispatch) -> None:
         """Note that the dispatched callback has run to completion."""
         self.callbacks.finish(dispatch)
-
-    def _take(self, kind: CallbackKind, index: int, resource: int) -> Dispatch:
-        return self.callbacks.take(self.callbacks[kind][index], resource)

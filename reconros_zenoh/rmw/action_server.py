@@ -152,7 +152,9 @@ class ActionServer:
         response.stamp.sec, response.stamp.nanosec = divmod(now_ns, _SECOND_NS)
         handle = GoalHandle(self, goal_id, request.goal, now_ns)
         with self._lock:
-            response.accepted = goal_id not in self._goals and self._is_accepted(request.goal)
+            response.accepted = goal_id not in self._goals and self._is_accepted(
+                request.goal, received.publisher.hex()
+            )
             if response.accepted:
                 self._goals[goal_id] = handle
         responder.respond_encoded(self._type.send_goal.response.encode(response))
@@ -160,11 +162,11 @@ class ActionServer:
             self._publish_status()
             self._on_goal(handle, received)
 
-    def _is_accepted(self, goal: object) -> bool:
+    def _is_accepted(self, goal: object, sender: str) -> bool:
         try:
             self._accept(goal)
         except BadMessageError as error:
-            self._context.rejections.add(self._name, None, error)
+            self._context.rejections.add(self._name, sender, error)
             return False
         return True
 

@@ -50,15 +50,21 @@ class Client(Endpoint):
         def on_received(received: Received | BadMessageError | TransportError) -> None:
             on_response(received.message if isinstance(received, Received) else received)
 
-        self.call_encoded(self.service_type.request.encode(request), on_received, timeout_ns)
+        parts = self.service_type.request.encode(request, joined_at_once=True)
+        self.call_encoded(parts, on_received, timeout_ns)
 
     def call_encoded(
         self,
         parts: Parts,
         on_received: Callable[[Received | BadMessageError | TransportError], None],
         timeout_ns: int,
+        sequence_number: int | None = None,
     ) -> None:
-        """Call the service like `call` with a request that is encoded already."""
+        """Call the service like `call` with a request that is encoded already.
+
+        `sequence_number` is what `next_sequence_number` has returned for this call; the response has it.
+        """
+        number = self.next_sequence_number() if sequence_number is None else sequence_number
         answered = False
 
         def on_reply(reply: Reply | None) -> None:
@@ -66,16 +72,16 @@ class Client(Endpoint):
             if answered:
                 return
             answered = True
-            on_received(self._result(reply))
+            on_received(self._result(reply, number))
 
-        self._querier.get(parts, self.next_attachment(), on_reply, timeout_ns)
+        self._querier.get(parts, self.attachment(number), on_reply, timeout_ns)
 
     def close(self) -> None:
         """Withdraw the client; a call that still waits is not heard of any more. Idempotent."""
         self.withdraw()
         self._querier.close()
 
-    def _result(self, reply: Reply | None) -> Received | BadMessageError | TransportError:
+    def _result(self, reply: Reply | None, number: int) -> Received | BadMessageError | TransportError:
         if reply is None:
             return TransportError(f"no answer from service {self.name}")
         if reply.payload is None:
@@ -87,4 +93,4 @@ class Client(Endpoint):
         except BadMessageError as error:
             self.context.rejections.add(self.key, None, error)
             return error
-        return Received(message, len(reply.payload), now_ns - sent_ns)
+        return Received(message, len(reply.payload), now_ns - sent_ns, sequence_number=number)

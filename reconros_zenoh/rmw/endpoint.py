@@ -50,6 +50,10 @@ class Endpoint:
         """Take the endpoint out of the graph."""
         self._token.close()
 
-    def next_attachment(self) -> bytes:
-        """Return the attachment of the endpoint's next message, stamped now."""
-        return Attachment(next(self._sequence_numbers), self.context.clock_ns(), self.gid).encode()
+    def next_sequence_number(self) -> int:
+        """Return the number of the endpoint's next message; callable from any thread."""
+        return next(self._sequence_numbers)
+
+    def attachment(self, sequence_number: int) -> bytes:
+        """Return the attachment of the message of that number, stamped now."""
+        return Attachment(sequence_number, self.context.clock_ns(), self.gid).encode()

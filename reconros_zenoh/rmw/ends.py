@@ -39,6 +39,10 @@ class NodeEnds(Protocol):
     def context(self) -> Context:
         """The session of the node."""
 
+    @property
+    def fully_qualified_name(self) -> str:
+        """The name of the node behind its namespace: `/arm/motor`."""
+
     def publisher(self, message_type: MessageType, topic: str, qos: QosProfile) -> PublisherEnd:
         """Return a new publisher."""
 

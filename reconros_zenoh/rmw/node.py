@@ -12,7 +12,7 @@ from reconros_zenoh.rmw.rejections import Rejections
 from reconros_zenoh.rmw.service import Service
 from reconros_zenoh.rmw.subscription import Subscription
 from reconros_zenoh.ros.graph import NodeToken
-from reconros_zenoh.ros.names import check_namespace, check_node_name
+from reconros_zenoh.ros.names import check_namespace, check_node_name, resolve
 from reconros_zenoh.ros.qos import QosProfile
 
 if TYPE_CHECKING:
@@ -66,6 +66,11 @@ class Node:
                 context.domain, context.transport.session_id, self.node_id, self.node_id, namespace, name
             ).format()
         )
+
+    @property
+    def fully_qualified_name(self) -> str:
+        """The name of the node behind its namespace: `/arm/motor`."""
+        return resolve("~", self.namespace, self.name)
 
     def publisher(
         self,

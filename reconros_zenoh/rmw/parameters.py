@@ -9,14 +9,18 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 
 from reconros_zenoh.errors import UsageError
+from reconros_zenoh.ros.qos import QosProfile
 from reconros_zenoh.ros.zero_message import zero_message
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Iterable, Sequence
 
     from reconros_zenoh.rmw.ends import NodeEnds
     from reconros_zenoh.rmw.received import Received
     from reconros_zenoh.ros.types import TypeRegistry
+
+_EVENTS = QosProfile(depth=1000)
+"""rmw_qos_profile_parameter_events: reliable, volatile, keep the last 1000."""
 
 Value: TypeAlias = bool | int | float | str | bytes | list[bool] | list[int] | list[float] | list[str]
 
@@ -47,8 +51,8 @@ class _Parameter:
 class Parameters:
     """The parameters of one node, served under `<node>/get_parameters` and its five sisters.
 
-    A parameter is declared first and keeps its type. Everything may be called from any thread. Deviation:
-    nothing is published on /parameter_events.
+    A parameter is declared first and keeps its type. Everything may be called from any thread. What is
+    declared or set is published on /parameter_events, also when the value is the one that it was.
     """
 
     def __init__(self, node: NodeEnds, types: TypeRegistry) -> None:
@@ -57,6 +61,10 @@ class Parameters:
         self._value_type = types.message("rcl_interfaces/msg/ParameterValue")
         self._descriptor_type = types.message("rcl_interfaces/msg/ParameterDescriptor")
         self._result_type = types.message("rcl_interfaces/msg/SetParametersResult")
+        self._parameter_type = types.message("rcl_interfaces/msg/Parameter")
+        self._event_type = types.message("rcl_interfaces/msg/ParameterEvent")
+        self._node = node
+        self._events = node.publisher(self._event_type, "/parameter_events", _EVENTS)
         services: dict[str, Callable[[Any, Any], None]] = {
             "DescribeParameters": self._describe,
             "GetParameters": self._get,
@@ -89,6 +97,8 @@ class Parameters:
             if name in self._parameters:
                 raise UsageError(f"parameter {name!r} is declared already.")
             self._parameters[name] = _Parameter(value, description, on_set)
+            event = self._event([name], [])
+        self._events.publish(event)
 
     def get(self, name: str) -> Any:
         """Return the value of a declared parameter."""
@@ -99,6 +109,8 @@ class Parameters:
         with self._lock:
             self._check(name, value)
             self._parameters[name].value = value
+            event = self._event([], [name])
+        self._events.publish(event)
 
     def _check(self, name: str, value: Value) -> None:
         parameter = self._declared(name)
@@ -165,8 +177,22 @@ class Parameters:
                 return result
             for name, value in values.items():
                 self._parameters[name].value = value
+            event = self._event([], values)
+        # Not with the lock held: who hears it may be in this session and set a parameter in turn.
+        if values:
+            self._events.publish(event)
         result.successful = True
         return result
+
+    def _event(self, declared: Iterable[str], changed: Iterable[str]) -> Any:
+        """Return what is published about these parameters as they are now."""
+        event = zero_message(self._event_type)
+        event.stamp.sec, event.stamp.nanosec = divmod(self._node.context.clock_ns(), 1_000_000_000)
+        event.node = self._node.fully_qualified_name
+        parameter = self._parameter_type.cls
+        event.new_parameters = [parameter(name=name, value=self._message(name)) for name in declared]
+        event.changed_parameters = [parameter(name=name, value=self._message(name)) for name in changed]
+        return event
 
 
 def _value(parameter: Any) -> Any:

@@ -34,11 +34,11 @@ class Publisher(Endpoint):
 
     def publish(self, message: object) -> None:
         """Publish the message."""
-        self.publish_encoded(self.message_type.encode(message))
+        self.publish_encoded(self.message_type.encode(message, joined_at_once=True))
 
     def publish_encoded(self, parts: Parts) -> None:
         """Publish a message that is encoded already, as `message_type.encode` does."""
-        self._publisher.put(parts, self.next_attachment())
+        self._publisher.put(parts, self.attachment(self.next_sequence_number()))
 
     def close(self) -> None:
         """Withdraw the publisher; idempotent."""

@@ -23,7 +23,8 @@ class Received(NamedTuple):
 
     `transit_ns` is the present time of the context's clock minus the source timestamp: between hosts it is
     only as good as their clocks agree. `responder` is None but for a request, `publisher` is the gid of the
-    publisher of a message.
+    publisher of a message or the client of a request, `sequence_number` that of the call which a response
+    answers.
     """
 
     message: Any
@@ -31,3 +32,4 @@ class Received(NamedTuple):
     transit_ns: int
     responder: Responder | None = None
     publisher: bytes = b""
+    sequence_number: int | None = None

@@ -27,7 +27,8 @@ class Rejections:
     def add(self, key: str, sender: str | None, error: BadMessageError) -> None:
         """Count a refused message; log it when it is the first of its kind from this sender.
 
-        `sender` is the sender's gid in hexadecimal, or None when the message does not tell.
+        `sender` is the sender's gid in hexadecimal, or the name of the callback that published inside a slot;
+        None when the message does not tell.
         """
         with self._lock:
             self._counts[error.reason] += 1

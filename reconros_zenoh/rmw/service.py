@@ -77,4 +77,5 @@ class Service(Endpoint):
             request.reply_error(str(error))
             return
         transit_ns = self.context.clock_ns() - attachment.source_timestamp_ns
-        self._sink(Received(message, len(payload), transit_ns, _Response(self.context, request, attachment)))
+        response = _Response(self.context, request, attachment)
+        self._sink(Received(message, len(payload), transit_ns, response, attachment.gid))

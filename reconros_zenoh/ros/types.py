@@ -20,6 +20,7 @@ from reconros_zenoh.ros.definitions import (
     message_definition,
     service_definitions,
 )
+from reconros_zenoh.ros.message_arrays import is_unchanging
 from reconros_zenoh.ros.names import dds_type_name
 from reconros_zenoh.ros.standard import standard_interfaces
 
@@ -79,11 +80,12 @@ class MessageType:
             self._nested[name] = MessageType(self._store, name)
         return self._nested[name]
 
-    def encode(self, message: Any) -> tuple[bytes | memoryview, ...]:
+    def encode(self, message: Any, *, joined_at_once: bool = False) -> tuple[bytes | memoryview, ...]:
         """Return the parts that joined are `message` as XCDR1 little endian, with its encapsulation.
 
-        A big array in the last field is not copied: the last part is a view of it, so it must not change
-        before the parts are joined. Raises UsageError for a message whose fields do not have their types.
+        A big array in the last field that nobody can change is not copied: the last part is a view of it.
+        With `joined_at_once` none is: then it must not change before the parts are joined. Raises UsageError
+        for a message whose fields do not have their types.
         """
         try:
             if self._last_array is not None:
@@ -93,7 +95,10 @@ class MessageType:
                     others = [getattr(message, other) for other in self._fields_before]
                     # The last thing in the header is the count of the last array, 0 so far.
                     header = self._serialize(self.cls(*others, empty))[: -_COUNT.size]
-                    return header + _COUNT.pack(len(array)), memoryview(array).cast("B").toreadonly()
+                    content: bytes | memoryview = memoryview(array).cast("B").toreadonly()
+                    if not (joined_at_once or is_unchanging(array)):
+                        content = bytes(content)
+                    return header + _COUNT.pack(len(array)), content
             return (self._serialize(message),)
         except (AttributeError, TypeError, ValueError, SerdeError, struct.error) as error:
             raise UsageError(

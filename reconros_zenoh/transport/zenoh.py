@@ -1,18 +1,20 @@
 """The transport over Zenoh, configured as rmw_zenoh has it; the only file that imports zenoh.
 
-Callbacks run directly on Zenoh's network threads (`indirect=False`), all but one kind: a thread of its own
-for each declaration costs a change of thread per message (20 us of a round trip of 290 us).
+Callbacks run directly on Zenoh's network threads, all but one kind: a thread of its own for each declaration
+costs a change of thread per message (20 us of a round trip of 290 us).
 """
 
 from __future__ import annotations
 
+import ctypes
 import json
 import os
 import re
 import sys
+import threading
 from contextlib import suppress
 from functools import partial
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, Self, TypeVar
 
 import zenoh
 from zenoh import ext
@@ -36,7 +38,11 @@ if TYPE_CHECKING:
 _HEARTBEAT_S = 0.5
 
 # One pool instead of a thread per stage nearly halves a round trip; of two threads, closing can have to wait.
-_THREADS = "(rx: (handover: net), tx: (handover: net), net: (worker_threads: 4))"
+# A socket is watched by the pool that accepted it: were `acc` elsewhere, a message would wake a thread more.
+_THREADS = "(rx: (handover: net), tx: (handover: net), acc: (handover: net), net: (worker_threads: 4))"
+
+_T = TypeVar("_T")
+_thread = threading.local()
 
 
 class ZenohRouter(Closing):
@@ -109,7 +115,7 @@ class ZenohTransport(Closing):
                     except Exception:  # noqa: BLE001 # as in `call`
                         declaration.log_failure()
 
-        handler = Callback(on_sample, indirect=False)
+        handler = _direct(on_sample)
         if qos.durability is Durability.TRANSIENT_LOCAL:
             reliable = qos.reliability is Reliability.RELIABLE
             declaration.add(
@@ -133,7 +139,7 @@ class ZenohTransport(Closing):
         def on_query(query: zenoh.Query) -> None:
             declaration.call(sink, _Request(str(query.key_expr) if is_pattern else key, query, self))
 
-        handler = Callback(on_query, indirect=False)
+        handler = _direct(on_query)
         declaration.add(self.session.declare_queryable, key, handler, complete=True)
         return declaration
 
@@ -162,7 +168,7 @@ class ZenohTransport(Closing):
         def on_sample(sample: zenoh.Sample) -> None:
             declaration.call(changes.report, str(sample.key_expr), sample.kind == zenoh.SampleKind.PUT)
 
-        handler = Callback(on_sample, indirect=False)
+        handler = _direct(on_sample)
         declaration.add(self.session.liveliness().declare_subscriber, key, handler, history=True)
         return declaration
 
@@ -324,7 +330,7 @@ class _Querier(_Declaration):
 
     def get(self, parts: Parts, attachment: bytes | None, on_reply: OnReply, timeout_ns: int) -> None:
         self.check_open()
-        handler = Callback(partial(self._take, on_reply), partial(self.call, on_reply, None), indirect=False)
+        handler = _direct(partial(self._take, on_reply), partial(self.call, on_reply, None))
         try:
             # A Zenoh querier has one timeout for all; a get of the session has its own and costs the same.
             self._transport.session.get(
@@ -345,6 +351,23 @@ class _Querier(_Declaration):
             self.call(on_reply, Reply(payload, _bytes(sample.attachment), None))
         elif (error := reply.err) is not None and not _is_timeout(reply, error):
             self.call(on_reply, Reply(None, None, error.payload.to_string()))
+
+
+def _direct(callback: Callable[[_T], None], drop: Callable[[], None] | None = None) -> Callback[_T]:
+    """Return a handler that runs on Zenoh's threads.
+
+    For a thread that it has not started, Python makes a thread state at every callback, maps memory for its
+    frames, and unmaps that at the end, which interrupts the other cores: a twentieth of a small round trip.
+    Asked for once more, the state stays as long as the thread.
+    """
+
+    def call(argument: _T) -> None:
+        if not hasattr(_thread, "has_state"):
+            _thread.has_state = True
+            ctypes.pythonapi.PyGILState_Ensure()
+        callback(argument)
+
+    return Callback(call, drop, indirect=False)
 
 
 def _open_pool(pool_bytes: int) -> Callable[[int], ZShmMut | None] | None:

@@ -124,6 +124,24 @@ def test_a_callback_that_fails_aborts_its_goal(caplog: pytest.LogCaptureFixture)
     assert case.executor.failures == {"serve": 2}
 
 
+def test_goals_that_are_refused_are_logged_once_for_each_client(caplog: pytest.LogCaptureFixture) -> None:
+    def check(_: Any) -> None:
+        raise BadMessageError("order", "too many")
+
+    case = Serving(in_software, hardware=False, check=check)
+    other = ActionClient(desktop(case.board).node("other"), FIBONACCI, "fibonacci", case.events.append)
+    case.run(1)
+    for _ in range(2):
+        case.send(1)
+        other.send_goal(FIBONACCI.goal.cls(order=1), other.new_goal_id())
+    assert case.run() == ["rejected"] * 4
+    assert case.board.context.rejections.counts() == {"order": 4}
+    senders = [client._send_goal.gid.hex() for client in (case.client, other)]  # type: ignore[attr-defined]
+    assert sorted(text.split(" (")[0] for text in caplog.messages) == sorted(
+        f"refused a message on fibonacci from publisher {sender}" for sender in senders
+    )
+
+
 def test_goals_that_are_refused() -> None:
     def check(goal: Any) -> None:
         if goal.order > 10:
@@ -231,3 +249,36 @@ def test_old_feedback_makes_room_and_nothing_else_does() -> None:
     assert case.client.dropped == 4
     last = [event.message.message for event in case.client._waiting if event.message.kind == "feedback"]
     assert len(last[-1].sequence) == 13
+
+
+def test_a_goal_is_taken_as_it_is_when_it_is_sent() -> None:
+    case = Asking(hardware=False)
+
+    def ask(_: object, context: SoftwareContext) -> None:
+        goal = case.client.goal(order=0)
+        context.send_goal(case.client, goal)
+        goal.order = 1
+
+    executor, tickets = Executor(case.board, 1, 0), Tickets(case.board)
+    executor.add_sw_callback("ask", SUB, tickets, ask)
+    executor.spin()
+    tickets.put(None)
+    case.board.environment.run(until=10**6)
+    assert [handle.goal.order for handle in case.handles] == [0]
+
+
+def test_with_a_goal_of_a_wrong_type_nothing_of_the_call_is_sent(caplog: pytest.LogCaptureFixture) -> None:
+    case = Asking(hardware=False)
+
+    def ask(_: object, context: SoftwareContext) -> None:
+        context.send_goal(case.client, case.client.goal(order=0))
+        context.send_goal(case.client, case.client.goal(order="many"))
+
+    executor, tickets = Executor(case.board, 1, 0), Tickets(case.board)
+    executor.add_sw_callback("ask", SUB, tickets, ask)
+    executor.spin()
+    tickets.put(None)
+    case.board.environment.run(until=10**6)
+    assert executor.failures == {"ask": 1}
+    assert "Goal cannot be serialised" in caplog.text
+    assert not case.handles

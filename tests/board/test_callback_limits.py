@@ -14,7 +14,7 @@ from reconros_zenoh.board.os_resources import Mailbox, Mutex
 from reconros_zenoh.board.timing import Cycles
 from reconros_zenoh.clock.virtual import succeed_once
 from reconros_zenoh.clock.wall import WallEnvironment
-from reconros_zenoh.errors import UsageError
+from reconros_zenoh.errors import CallbackError, UsageError
 from reconros_zenoh.executor.callbacks import CallbackKind
 
 if TYPE_CHECKING:
@@ -59,7 +59,7 @@ def test_a_slot_that_waits_for_ever_is_freed(caplog: pytest.LogCaptureFixture) -
     board.environment.run(until=200_000)
     assert mailbox.try_get() == 7  # nobody waits for it any more
     (record,) = caplog.records
-    assert record.getMessage() == "callback a failed after reconfiguration 0.001 ms"
+    assert record.getMessage().startswith("callback a failed after reconfiguration 0.001 ms; ")
     assert record.exc_info is not None
     assert str(record.exc_info[1]) == "callback a did not end within its limit of 0.005 ms."
 
@@ -145,6 +145,30 @@ def test_a_computation_that_never_ends(
     assert executor.failures == {"a": 1}
     assert "did not end within its limit of 20 ms" in caplog.text
     board.close()
+
+
+def test_a_function_that_was_given_up_gets_no_mutex(
+    forever: threading.Event, caplog: pytest.LogCaptureFixture
+) -> None:
+    board = small_board(PROFILE)
+    mutex, ended = Mutex(board.environment), threading.Event()
+
+    def late(_: object, context: SoftwareContext) -> None:
+        forever.wait()
+        try:
+            context.mutex_trylock(mutex)
+        except CallbackError:
+            ended.set()
+
+    executor, source = Executor(board, 1, 0), Tickets(board)
+    executor.add_sw_callback("a", SUB, source, late, limit_ms=1)
+    executor.spin()
+    source.put(1)
+    board.environment.run(until=10**9)
+    assert executor.failures == {"a": 1}
+    forever.set()
+    assert ended.wait(10)
+    assert mutex.try_lock("somebody")
 
 
 @pytest.mark.parametrize("limit_ms", [0, -1, float("inf"), float("nan")])

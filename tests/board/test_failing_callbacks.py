@@ -6,11 +6,14 @@ import logging
 import sys
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import pytest
-from small_board import Tickets, desktop, small_board, small_profile, types
+from small_board import Tickets, desktop, small_board, small_profile, start, types
 
 from reconros_zenoh.board.endpoints import ServiceSource, SubscriptionSource, TopicWriter
 from reconros_zenoh.board.executor import Executor
+from reconros_zenoh.board.hmt import FifoPlan, HmtSource, HmtWriter
+from reconros_zenoh.board.spans import Timeline
 from reconros_zenoh.errors import TransportError
 from reconros_zenoh.executor.callbacks import CallbackKind
 
@@ -99,14 +102,31 @@ def test_a_callback_in_hardware(when: str, caplog: pytest.LogCaptureFixture) -> 
     assert slot.busy_ns == (14 if when == "before the computation" else 114)
 
 
-def test_every_failure_is_logged(caplog: pytest.LogCaptureFixture) -> None:
-    board = small_board(PROFILE)
-    executor, source = software_board(board)
-    for _ in range(3):
-        source.put(0)
+def test_each_way_to_fail_is_logged_once_and_every_failure_is_counted(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    def fails(way: str, _: SoftwareContext) -> None:
+        if way == "here":
+            raise NoughtError(way)
+        if way == "there":
+            raise NoughtError(way)
+        raise KeyError(way) if way == "otherwise" else NoughtError(way)
+
+    board = small_board(small_profile({"a": (100, 100), "b": (100, 100)}))
+    executor = Executor(board, 1, 0)
+    a, b = Tickets(board), Tickets(board)
+    executor.add_sw_callback("a", CallbackKind.SUB, a, fails)
+    executor.add_sw_callback("b", CallbackKind.SUB, b, fails)
+    executor.spin()
+    for way in ("here", "there", "here", "otherwise", "so", "there"):
+        a.put(way)
+    b.put("here")
     board.environment.run(until=1000)
-    assert executor.failures == {"a": 3}
-    assert len(caplog.records) == 3
+    assert executor.failures == {"a": 6, "b": 1}
+    told = sorted(str(record.exc_info[1]) for record in caplog.records if record.exc_info)
+    assert told == ["'otherwise'", "here", "here", "so", "there"]
+    for record in caplog.records:
+        assert record.getMessage().endswith(" ms; a failure of this kind is not reported again")
 
 
 def test_what_a_failed_callback_wanted_to_publish_is_not_published(caplog: pytest.LogCaptureFixture) -> None:
@@ -234,7 +254,10 @@ def test_a_callback_in_software_that_wants_to_end_the_board(
     assert executor.failures == {"a": 2}
 
 
-def test_hardware_callbacks_that_are_not_written_as_they_must_be(caplog: pytest.LogCaptureFixture) -> None:
+@pytest.mark.parametrize("limit_ms", [None, 1000.0])
+def test_hardware_callbacks_that_are_not_written_as_they_must_be(
+    limit_ms: float | None, caplog: pytest.LogCaptureFixture
+) -> None:
     def leaves(_: HardwareThread) -> Steps:
         sys.exit(3)
         yield
@@ -245,13 +268,86 @@ def test_hardware_callbacks_that_are_not_written_as_they_must_be(caplog: pytest.
     def waits_for_nothing(_: HardwareThread) -> Any:
         yield
 
-    callbacks = [leaves, forgets_from, waits_for_nothing, lambda _: 5, lambda _: None]
-    for callback in callbacks:
+    callbacks: dict[Callable[[HardwareThread], Any], str] = {
+        leaves: "3",
+        forgets_from: "cannot be waited for. Call what takes time with `yield from`.",
+        waits_for_nothing: "None cannot be waited for. Call what takes time with `yield from`.",
+        lambda _: 5: "a hardware callback is a generator, this one returned 5. Call what takes time",
+        lambda _: None: "a hardware callback is a generator, this one returned None. Call what takes time",
+        lambda _: [7]: "a hardware callback is a generator, this one returned [7]. Call what takes time",
+    }
+    for callback, text in callbacks.items():
+        caplog.clear()
         board = small_board(PROFILE, 1)
         executor, source = Executor(board, 0, 1), Tickets(board)
-        executor.add_hw_callback("a", [0], CallbackKind.SUB, source, callback)
+        executor.add_hw_callback("a", [0], CallbackKind.SUB, source, callback, limit_ms=limit_ms)
         executor.spin()
         source.put(1)
         source.put(2)
         board.environment.run(until=100_000)
         assert executor.failures == {"a": 2}, callback
+        assert text in str(caplog.records[0].exc_info[1])  # type: ignore[index]
+
+
+BYTES = types().message("std_msgs/msg/UInt8MultiArray")
+
+
+def a_message(value: int) -> Any:
+    layout = types().message("std_msgs/msg/MultiArrayLayout").cls(dim=[], data_offset=0)
+    return BYTES.cls(layout=layout, data=np.full(4, value, np.uint8))
+
+
+@pytest.mark.parametrize("way", ["network", "board", "stream", "stream with overhead"])
+@pytest.mark.parametrize("wrong", [lambda: sys.exit(3), lambda: {}["no"]], ids=["exit", "error"])
+def test_a_check_that_fails_itself_refuses_the_message_and_harms_nobody(
+    way: str, wrong: Callable[[], Any], caplog: pytest.LogCaptureFixture
+) -> None:
+    overhead_ns = 7 if way == "stream with overhead" else 0
+    board = small_board(
+        small_profile(
+            {"picky": (0, 0), "patient": (0, 0)},
+            hmt_overhead_ns=overhead_ns,
+            topics={} if way == "board" else None,
+        ),
+        slots=2,
+    )
+    topic, node = board.hardware_topic("/a", BYTES), board.context.node("n")
+
+    def check(message: Any) -> None:
+        if message.data[0] == 0:
+            wrong()
+
+    heard: dict[str, list[int]] = {"picky": [], "patient": []}
+
+    def listen(name: str) -> Callable[[HardwareThread], Steps]:
+        def thread(thread: HardwareThread) -> Steps:
+            message = yield from thread.get_init_data()
+            heard[name].append(int(message.data[0]))
+
+        return thread
+
+    executor = Executor(board, 0, 2)
+    for slot, name in enumerate(heard):
+        source = (
+            HmtSource(board, topic, FifoPlan())
+            if way.startswith("stream")
+            else SubscriptionSource(board, node, BYTES, "/a", in_hardware=True)
+        )
+        executor.add_hw_callback(
+            name, [slot], CallbackKind.SUB, source, listen(name), check if name == "picky" else None
+        )
+    executor.spin()
+    publisher = desktop(board).node("c").publisher(BYTES, "/a")
+    writer = HmtWriter(topic) if way.startswith("stream") else board.writer(node, BYTES, "/a")
+    # More than a FIFO holds: a message that is refused must give its place back.
+    for value in (0, 0, 0, 1):
+        if way == "network":
+            publisher.publish(a_message(value))
+        else:
+            timeline = Timeline(board.environment, board.environment.now)
+            start(board.environment, writer.publish(a_message(value), board.osif, timeline))
+    board.environment.run(until=100_000)
+    assert heard == {"picky": [1], "patient": [0, 0, 0, 1]}
+    assert board.context.rejections.counts() == {"check_failed": 3}
+    (text,) = caplog.messages
+    assert "the check of callback picky failed: " in text

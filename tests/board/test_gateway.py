@@ -43,9 +43,10 @@ def size_of(body: Any) -> int:
 
 
 def message(number: int = 0, size: int = U) -> Any:
-    """A message of `size` bytes on the wire whose first byte is the number."""
+    """A message of `size` bytes on the wire whose first byte is the number; it cannot change any more."""
     data = np.zeros(size - HEADER, np.uint8)
     data[0] = number
+    data.flags.writeable = False
     return words.cls(layout=layout, data=data)
 
 
@@ -98,7 +99,7 @@ def test_from_hardware_a_message_is_streamed_to_all_and_written_to_memory_once(s
     side.environment.run()
     assert side.hardware == [[(U + G, body)]] * subscribers
     assert side.software == [(U + C + A + D, body)]
-    assert side.software[0][1] is body
+    assert side.software[0][1].data is body.data
     assert side.board.memif.transferred_bytes == U
 
 
@@ -110,7 +111,7 @@ def test_from_software_it_is_read_from_memory_once_while_it_is_streamed(subscrib
     side.environment.run()
     assert side.hardware == [[(A + K * U + D + U + G, body)]] * subscribers
     assert side.software == [(A + K * U + E + L * U, body)]
-    assert side.hardware[0][0][1] is body
+    assert side.hardware[0][0][1].data is body.data
     assert side.board.memif.transferred_bytes == U
 
 
@@ -158,15 +159,28 @@ def test_boards_whose_gateways_share_a_topic_hear_each_other_once(profile: Profi
     assert sorted(heard_elsewhere) == [0, 1, 2, 10, 11, 12]
 
 
-def test_a_message_that_no_fifo_holds_is_refused_and_the_gateway_goes_on() -> None:
-    side = Side(small_board(modelled()))
+@pytest.mark.parametrize("topics", [TOPICS, None], ids=["local topics", "network only"])
+def test_a_message_that_no_fifo_holds_is_refused_and_the_gateway_goes_on(
+    topics: Any, caplog: pytest.LogCaptureFixture
+) -> None:
+    profile = small_profile(topics=topics, cores=4, hmt_overhead_ns=G, cancel_ns=C)
+    side = Side(small_board(profile))
+    side.environment.run()
+    elsewhere = [desktop(side.board).node(name).publisher(words, "/a") for name in ("x", "y")]
     side.topic.subscribe(Fifo(FifoPlan(100, message_bytes=U), lambda: None, None, cut_through=False))
-    side.publish_in_software(message(1, U + 1))
+    for _ in range(2):
+        side.publish_in_software(message(1, U + 1))
+        for publisher in elsewhere:
+            publisher.publish(message(1, U + 1))
     side.publish_in_software(message(2))
     side.environment.run()
-    assert side.gateway.refused == 1
-    assert side.board.context.rejections.counts() == {"fifo_size": 1}
-    assert side.numbers() == [[2], [2], [1, 2]]
+    assert side.gateway.refused == 6
+    assert side.board.context.rejections.counts() == {"fifo_size": 6}
+    assert [heard[-1] for heard in side.numbers()] == [2, 2, 2]
+    senders = [side.writer.gid, *(publisher.gid for publisher in elsewhere)]
+    assert sorted(text.split(" (")[0] for text in caplog.messages) == sorted(
+        f"refused a message on hmt/board0/a from publisher {sender.hex()}" for sender in senders
+    )
 
 
 def test_a_second_gateway_on_a_topic_is_refused_and_so_is_another_type() -> None:

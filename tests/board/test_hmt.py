@@ -183,11 +183,50 @@ def test_a_kernel_between_two_streams_costs_no_memif() -> None:
     board.environment.run()
     assert log[0] is body.data
     streamed = arrived.take()
-    assert streamed.message is body
+    # The first stream did not copy it, because the test published it; the second had to.
+    assert streamed.message.data.tolist() == body.data.tolist()
+    assert streamed.message.data is not body.data
     assert board.memif.transferred_bytes == 0
     # 100 ns on one stream, 1000 to load the slot, 100 on the other
     assert streamed.timeline.stages_ns["reconfiguration"] == 1000
     assert board.environment.now == 1200
+
+
+@pytest.mark.parametrize("writeable", [True, False])
+def test_what_becomes_of_a_message_after_it_was_published_is_the_publishers_own_affair(
+    writeable: bool,
+) -> None:
+    data = np.zeros(84, np.uint8)
+    data.flags.writeable = writeable
+    board = small_board(small_profile({"a": (0, 0)}), slots=1)
+    topic = board.hardware_topic("/out", words)
+    arrived = Fifo(FifoPlan(), lambda: None, None, cut_through=False)
+    other = Fifo(FifoPlan(), lambda: None, None, cut_through=False)
+    topic.subscribe(arrived)
+    topic.subscribe(other)
+    writer = HmtWriter(topic)
+
+    def thread(hardware: Any) -> Steps:
+        body = words.cls(layout=layout, data=data)
+        if writeable:
+            board.environment.call_later(50, data.fill, 1)  # while the words pass
+        yield from hardware.publish(writer, body)
+        body.data = np.full(84, 2, np.uint8)
+        yield from hardware.publish(writer, body)
+
+    executor, tickets = Executor(board, 0, 1), Tickets(board)
+    executor.add_hw_callback("a", [0], CallbackKind.SUB, tickets, thread)
+    executor.spin()
+    tickets.put(None)
+    board.environment.run()
+    assert executor.failures == {}
+    assert data[0] == (1 if writeable else 0)
+    messages = [arrived.take().message for _ in range(2)]
+    assert [message.data[0] for message in messages] == [0, 2]
+    # Nor can one subscriber change what another one gets.
+    assert all(message is other.take().message for message in messages)
+    assert not any(message.data.flags.writeable for message in messages)
+    assert (messages[0].data is data) != writeable
 
 
 def test_a_kernel_at_a_software_mapped_topic_pays_the_memif_for_the_same_lines() -> None:
@@ -206,8 +245,10 @@ def test_a_kernel_at_a_software_mapped_topic_pays_the_memif_for_the_same_lines()
     assert board.memif.transferred_bytes == 100 - HEADER
 
 
-def test_a_bad_message_is_counted_and_its_place_is_free_again() -> None:
-    board = small_board(small_profile())
+def test_a_bad_message_is_counted_logged_once_per_callback_and_its_place_is_free_again(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    board = small_board(small_profile({"left": (0, 0), "right": (0, 0)}), slots=2)
     topic = board.hardware_topic("/a", words)
     source = HmtSource(board, topic, FifoPlan(depth=1))
 
@@ -215,12 +256,23 @@ def test_a_bad_message_is_counted_and_its_place_is_free_again() -> None:
         raise BadMessageError("image_size", "too small")
 
     source.open(lambda: None, check)
+    executor = Executor(board, 0, 2)
+    tickets = [Tickets(board), Tickets(board)]
+    for slot, name in enumerate(("left", "right")):
+        callback = relay(HmtWriter(topic), [])
+        executor.add_hw_callback(name, [slot], CallbackKind.SUB, tickets[slot], callback)
+    executor.spin()
     for _ in range(3):
-        start(board.environment, topic.publish("p", message(20), 20, Timeline(board.environment, 0)))
+        for end in tickets:
+            end.put(message(20))
     board.environment.run()
     assert not source.is_ready()
-    assert topic.passed == 3
-    assert dict(board.context.rejections.counts()) == {"image_size": 3}
+    assert topic.passed == 6
+    assert dict(board.context.rejections.counts()) == {"image_size": 6}
+    assert sorted(text.split(" (")[0] for text in caplog.messages) == [
+        "refused a message on hmt/board0/a from publisher left",
+        "refused a message on hmt/board0/a from publisher right",
+    ]
 
 
 def test_no_end_of_a_stream_runs_in_software() -> None:
@@ -282,3 +334,60 @@ def test_pointers_and_plain_kernels_work_on_a_stream_as_well() -> None:
     assert arrived.take().message.data.tolist() == (2 * body.data).tolist()
     assert board.memif.transferred_bytes == 0
     assert executor.failures == {}
+
+
+def read_bytes(source: Any) -> int:
+    """How much crosses the MEMIF when a callback reads this for a message that came over a stream."""
+
+    def reader(hardware: Any) -> Steps:
+        init = yield from hardware.get_init_data()
+        yield from hardware.mem_read(*source(hardware, init))
+
+    board = small_board(small_profile({"reader": (0, 0)}), slots=1)
+    topic = board.hardware_topic("/in", words)
+    executor = Executor(board, 0, 1)
+    executor.add_hw_callback("reader", [0], CallbackKind.SUB, HmtSource(board, topic, FifoPlan()), reader)
+    executor.spin()
+    body = words.cls(layout=layout, data=WHOLE[:84])
+    start(board.environment, topic.publish("p", body, size_of(body), Timeline(board.environment, 0)))
+    board.environment.run()
+    assert (executor.calls, executor.failures) == ({"reader": 1}, {})
+    return board.memif.transferred_bytes
+
+
+def block_of(hardware: Any, init: Any) -> int:
+    """Where the bytes of `data` stand."""
+    pointer = hardware._board.memory.read(init + hardware.offsetof(words, "data.data"), 4)
+    return int(pointer.view(np.uint32)[0])
+
+
+MESSAGE_READS = {
+    "an array": lambda _, init: (init.data,),
+    "a view of it": lambda _, init: (init.data[10:20:2].reshape(1, 5),),
+    "all of it backwards": lambda _, init: (init.data[::-1],),
+    "a field as an array": lambda _, init: (init.array("data"),),
+    "a number as an array": lambda _, init: (init.array("layout.data_offset"),),
+    "its struct": lambda _, init: (init, 4),
+    "a block of it": lambda hw, init: (block_of(hw, init), 84),
+}
+OTHER_READS = {
+    "a copy of its array": (lambda _, init: (init.data.copy(),), 84),
+    "an array that its array is a part of": (lambda _, __: (WHOLE,), 200),
+    "an array of the program": (lambda _, __: (np.zeros(60, np.uint8),), 60),
+    "other memory": (lambda hw, _: (hw._board.memory.map(np.zeros(50, np.uint8)), 40), 40),
+    "other memory, with its struct placed": (
+        lambda hw, init: (hw._board.memory.map(np.zeros(init.address and 50, np.uint8)) + 8, 40),
+        40,
+    ),
+}
+WHOLE = np.arange(200, dtype=np.uint8)
+
+
+@pytest.mark.parametrize("source", MESSAGE_READS.values(), ids=MESSAGE_READS.keys())
+def test_a_message_of_a_stream_lies_in_the_slot(source: Any) -> None:
+    assert read_bytes(source) == 0
+
+
+@pytest.mark.parametrize(("source", "size"), OTHER_READS.values(), ids=OTHER_READS.keys())
+def test_all_else_has_to_be_read_from_memory(source: Any, size: int) -> None:
+    assert read_bytes(source) == size

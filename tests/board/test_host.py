@@ -224,6 +224,62 @@ def test_a_read_only_view_of_an_array_that_changes_is_computed_anew() -> None:
     assert host.compute(kernel, view) == 9
 
 
+def the_same(array: Any) -> Any:
+    return array
+
+
+def a_part(array: Any) -> Any:
+    return array[:1]
+
+
+def doubled(array: Any) -> Any:
+    return 2 * array, len(array)
+
+
+@pytest.mark.parametrize("threads", [None, 1])
+def test_a_result_stays_what_it_is_whatever_becomes_of_the_argument(threads: int | None) -> None:
+    host = Host(VirtualEnvironment(), threads)
+    for kernel in (the_same, a_part):
+        array = np.array([1, 2])
+        result = host.compute(kernel, array)
+        array[0] = 7  # which is not read-only now
+        assert result[0] == 1
+        assert host.compute(kernel, np.array([1, 2]))[0] == 1
+    host.close()
+
+
+@pytest.mark.parametrize("threads", [None, 1])
+def test_nobody_can_change_a_result_that_others_may_get(threads: int | None) -> None:
+    host = Host(VirtualEnvironment(), threads)
+    result, length = host.compute(doubled, np.array([1, 2]))
+    with pytest.raises(ValueError, match="read-only"):
+        result[0] = 7
+    assert length == 2
+    host.close()
+
+
+def test_equal_numbers_of_different_types_are_different_arguments() -> None:
+    host = Host(VirtualEnvironment(), threads=None)
+    kernel = Counting(type)
+    numbers = [1, 1.0, True, np.uint8(1), np.int64(1)]
+    assert [host.compute(kernel, number) for number in numbers * 2] == [
+        type(number) for number in numbers
+    ] * 2
+    assert kernel.calls == 5
+
+
+@pytest.mark.parametrize("threads", [None, 1])
+def test_what_has_no_hash_is_computed_each_time(threads: int | None) -> None:
+    host = Host(VirtualEnvironment(), threads)
+    kernel = Counting(len)
+    numbers = [1, 2]
+    assert host.compute(kernel, numbers) == 2
+    numbers.append(3)
+    assert host.compute(kernel, numbers) == 3
+    assert kernel.calls == 2
+    host.close()
+
+
 def test_two_kernels_do_not_share_results() -> None:
     host = Host(VirtualEnvironment(), threads=None)
     assert host.compute(np.max, GRID) == 5

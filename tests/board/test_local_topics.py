@@ -81,8 +81,8 @@ class Setup:
 
         return thread
 
-    def publish(self, *, hardware: bool) -> Any:
-        body = words.cls(layout=layout, data=np.zeros(U, np.uint8))
+    def publish(self, *, hardware: bool, data: Any = None) -> Any:
+        body = words.cls(layout=layout, data=np.zeros(U, np.uint8) if data is None else data)
         timeline = Timeline(self.environment, self.environment.now)
         if hardware:
             Activity(self.writer.publish(body, self.board.osif, timeline))
@@ -117,13 +117,40 @@ def test_from_software_the_publisher_copies_and_readers_in_hardware_slow_the_one
     }
 
 
-def test_the_message_is_handed_over_by_reference_and_nothing_leaves_the_board() -> None:
+def test_all_readers_get_one_copy_of_the_message_and_nothing_leaves_the_board() -> None:
     setup = Setup(2)
     put = []
     setup.writer._publisher.publish_encoded = put.append  # type: ignore[method-assign]
     body = setup.publish(hardware=True)
-    assert all(received[0][1].data is body.data for received in setup.got.values())
+    copies = [received[0][1].data for received in setup.got.values()]
+    assert all(copy is copies[0] for copy in copies)
+    assert not np.shares_memory(copies[0], body.data)
+    assert not copies[0].flags.writeable
     assert not put
+
+
+def test_an_array_that_nobody_can_change_is_handed_over_by_reference() -> None:
+    setup = Setup(2)
+    data = np.zeros(U, np.uint8)
+    data.flags.writeable = False
+    body = setup.publish(hardware=True, data=data)
+    assert all(received[0][1].data is body.data for received in setup.got.values())
+
+
+@pytest.mark.parametrize("hardware", [True, False])
+def test_what_becomes_of_a_message_after_it_was_published_is_the_publishers_own_affair(
+    hardware: bool,
+) -> None:
+    setup = Setup(2)
+    data = np.zeros(U, np.uint8)
+
+    def change() -> None:
+        data[:] = 7
+
+    setup.environment.call_later(A // 2, change)
+    setup.publish(hardware=hardware, data=data)
+    assert data[0] == 7
+    assert [received[0][1].data.any() for received in setup.got.values()] == [False] * 3
 
 
 def test_a_reader_elsewhere_gets_it_over_the_link_and_those_here_get_it_once() -> None:

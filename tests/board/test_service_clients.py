@@ -11,6 +11,7 @@ from reconros_zenoh.board.clients import ClientSource
 from reconros_zenoh.board.executor import Executor
 from reconros_zenoh.errors import BadMessageError
 from reconros_zenoh.executor.callbacks import CallbackKind
+from reconros_zenoh.ros.attachment import Attachment
 
 if TYPE_CHECKING:
     from small_board import Steps
@@ -19,19 +20,23 @@ if TYPE_CHECKING:
     from reconros_zenoh.board.software import SoftwareContext
 
 SET_BOOL = types().service("std_srvs/srv/SetBool")
-PROFILE = small_profile({"ask": (100, 100), "hear": (50, 50)}, link_ns=1000, osif_ns=7)
+CALLBACKS = {"ask": (100, 100), "hear": (50, 50)}
 SECOND_NS = 10**9
 
 
 class Asking:
     """A board whose callback `ask` calls the service and whose callback `hear` gets the responses."""
 
-    def __init__(self, *, hardware: bool = False, serve: bool = True, check: Any = None) -> None:
-        self.board = small_board(PROFILE, 2)
+    def __init__(
+        self, *, hardware: bool = False, serve: bool = True, check: Any = None, **options: Any
+    ) -> None:
+        self.board = small_board(small_profile(CALLBACKS, link_ns=1000, osif_ns=7, **options), 2)
         self.client = ClientSource(self.board, self.board.context.node("client"), SET_BOOL, "set", SECOND_NS)
         self.executor = Executor(self.board, 1, 2)
         self.tickets = Tickets(self.board)
         self.heard: list[tuple[int, Any]] = []
+        self.called: dict[int, Any] = {}
+        self.answered: list[int | None] = []
         if hardware:
             self.executor.add_hw_callback("ask", [0], CallbackKind.SUB, self.tickets, self.ask_in_hardware)
             self.executor.add_hw_callback(
@@ -46,18 +51,21 @@ class Asking:
             desktop(self.board).node("server").service(SET_BOOL, "set", self.serve)
 
     def ask(self, ticket: Any, context: SoftwareContext) -> None:
-        context.call(self.client, self.client.request(data=bool(ticket)))
+        self.called[context.call(self.client, self.client.request(data=bool(ticket)))] = ticket
 
     def hear(self, response: Any, context: SoftwareContext) -> None:
         self.heard.append((context.now_ns, response))
+        self.answered.append(context.sequence_number)
 
     def ask_in_hardware(self, thread: HardwareThread) -> Steps:
         ticket = yield from thread.get_init_data()
-        yield from thread.call(self.client, self.client.request(data=bool(ticket)))
+        number = yield from thread.call(self.client, self.client.request(data=bool(ticket)))
+        self.called[number] = ticket
 
     def hear_in_hardware(self, thread: HardwareThread) -> Steps:
         response = yield from thread.get_init_data()
         self.heard.append((self.board.environment.now, response))
+        self.answered.append(thread.sequence_number)
 
     def serve(self, received: Any) -> None:
         self.requests.append(received.message.data)
@@ -96,6 +104,32 @@ def test_a_call_without_an_answer_is_told_as_none(hardware: bool, caplog: pytest
     assert "a call of service /set has no answer: no answer from service /set" in caplog.text
 
 
+def test_that_nobody_answers_is_logged_once_until_somebody_does(caplog: pytest.LogCaptureFixture) -> None:
+    case = Asking(serve=False)
+    node = desktop(case.board).node("server")
+    node.service(
+        SET_BOOL,
+        "set",
+        lambda received: (
+            case.serve(received) if received.message.data else received.responder.fail("no time")
+        ),
+    )
+    for ticket in (0, 0, 0, 1, 0, 0):
+        case.tickets.put(ticket)
+        case.board.environment.run(until=case.board.environment.now + 10_000)
+    assert case.client.unanswered == 5
+    text = "a call of service /set has no answer: service /set refused: no time"
+    assert caplog.messages == [f"{text}; until one has, this is not reported again"] * 2
+
+
+def test_calls_that_are_pushed_out_before_they_are_sent_are_counted() -> None:
+    case = Asking(dds_message_ns=1_000_000)
+    case.run(*range(15))
+    # One goes through the stack, ten wait, each further one pushes the oldest out.
+    assert len(case.requests) == len(case.heard) == 11
+    assert case.executor.statistics()["hear"]["dropped"] == 4
+
+
 def test_a_server_that_says_nothing_is_given_up_in_time(caplog: pytest.LogCaptureFixture) -> None:
     case = Asking(serve=False)
     held: list[Any] = []
@@ -124,6 +158,54 @@ def test_a_response_that_the_callback_cannot_use(caplog: pytest.LogCaptureFixtur
     case.run(0, 1)
     assert [getattr(response, "success", None) for _, response in case.heard] == [None, True]
     assert case.board.context.rejections.counts() == {"success": 1}
+
+
+@pytest.mark.parametrize("hardware", [False, True])
+def test_a_callback_can_tell_which_call_a_response_belongs_to(
+    hardware: bool, caplog: pytest.LogCaptureFixture
+) -> None:
+    case = Asking(hardware=hardware, serve=False)
+    held: list[Any] = []
+    desktop(case.board).node("server").service(SET_BOOL, "set", held.append)
+    for ticket in (1, 2, 3):
+        case.tickets.put(ticket)
+    case.board.environment.run(until=SECOND_NS // 2)
+    assert [case.called[number] for number in (1, 2, 3)] == [1, 2, 3]
+    # The last call is answered first, the second is refused, the first not answered at all.
+    answer = SET_BOOL.response.encode(SET_BOOL.response.cls(success=True, message=""))
+    held[2].responder.respond_encoded(answer)
+    case.board.environment.run(until=SECOND_NS // 2 + 10_000)
+    held[1].responder.fail("no time")
+    case.run()
+    assert [case.called[number] for number in case.answered if number] == [3, 2, 1]
+    assert [response is None for _, response in case.heard] == [False, True, True]
+
+
+def test_calls_are_numbered_on_the_wire_as_their_callers_know_them() -> None:
+    case = Asking(serve=False)
+    seen: list[int] = []
+
+    def serve(request: Any) -> None:
+        seen.append(Attachment.decode(request.attachment).sequence_number)
+
+    server = desktop(case.board)
+    server.transport.serve(case.client._client.key, serve)
+    server.node("server").service(SET_BOOL, "set", lambda _: None)
+    case.run(1, 2)
+    assert seen == list(case.called) == [1, 2]
+
+
+def test_what_is_no_response_has_no_sequence_number() -> None:
+    case = Asking()
+    numbers: list[int | None] = []
+    executor, tickets = Executor(case.board, 1, 0), Tickets(case.board)
+    executor.add_sw_callback(
+        "ask", CallbackKind.SUB, tickets, lambda _, context: numbers.append(context.sequence_number)
+    )
+    executor.spin()
+    tickets.put(1)
+    case.run()
+    assert numbers == [None]
 
 
 def test_a_request_of_a_wrong_type_fails_the_caller(caplog: pytest.LogCaptureFixture) -> None:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from fractions import Fraction
 from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
+import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 from small_board import start
@@ -14,7 +16,7 @@ from reconros_zenoh.board.sharing import SharedResource
 from reconros_zenoh.clock.virtual import VirtualEnvironment
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from small_board import Steps
 
@@ -268,3 +270,18 @@ def test_without_holds_the_last_job_ends_when_all_work_is_done(
     last_ends = max(backlog_ends, *(Fraction(job.arrives_ns) for job in jobs))
     got = max(ends(jobs, capacity=float(capacity), per_job=float(capacity)))
     assert abs(got - last_ends) <= len(jobs) + 1
+
+
+@pytest.mark.parametrize("stop", [lambda job: job.throw(ValueError), lambda job: job.close()])
+def test_a_job_that_is_stopped_leaves_its_share_to_the_others(stop: Callable[[Steps], object]) -> None:
+    environment = VirtualEnvironment()
+    resource = SharedResource(environment, capacity=1, per_job=1)
+    stopped = resource.serve(1000)
+    next(stopped)
+    end = start(environment, resource.serve(100))
+    environment.run(until=20)
+    with suppress(ValueError):
+        stop(stopped)
+    environment.run(until=end)
+    # 10 of its 100 units are done after 20 ns together, the other 90 alone.
+    assert environment.now == 110

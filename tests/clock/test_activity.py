@@ -217,15 +217,17 @@ def test_stopped_steps_may_wait_once_more_before_they_end() -> None:
     assert ended == [17, 17]
 
 
+@pytest.mark.parametrize("with_limit", [False, True])
 @pytest.mark.parametrize("junk", [None, 5, "word"])
-def test_what_cannot_be_waited_for_is_raised_where_it_was_yielded(junk: Any) -> None:
+def test_what_cannot_be_waited_for_is_raised_where_it_was_yielded(junk: Any, with_limit: bool) -> None:
     said = []
 
     def work() -> Generator[Awaitable, object, None]:
-        try:
-            yield junk
-        except TypeError as error:
-            said.append(str(error))
+        for _ in range(2):
+            try:
+                yield junk
+            except TypeError as error:
+                said.append(str(error))
 
-    Activity(work())
-    assert said == [f"{junk!r} cannot be waited for. Call what takes time with `yield from`."]
+    Activity(limited(work(), Signal(), ValueError) if with_limit else work())
+    assert said == [f"{junk!r} cannot be waited for. Call what takes time with `yield from`."] * 2

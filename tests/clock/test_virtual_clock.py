@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import signal
-
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -107,40 +104,3 @@ def test_succeed_once_lets_an_event_happen_and_then_does_nothing() -> None:
     environment.call_later(2, succeed_once, event)
     environment.run()
     assert happened == [1]
-
-
-def test_a_signal_that_comes_in_a_finalizer_is_not_lost() -> None:
-    class Interrupted:
-        def __del__(self) -> None:
-            os.kill(os.getpid(), signal.SIGINT)
-
-    environment = VirtualEnvironment()
-    done: list[str] = []
-    environment.call_later(1, Interrupted)
-    environment.call_later(1, done.append, "the same moment")
-    with pytest.raises(KeyboardInterrupt):
-        environment.run()
-    assert (environment.now, done) == (1, [])
-    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
-
-
-def test_a_signal_in_the_last_event_is_not_lost() -> None:
-    environment = VirtualEnvironment()
-    last = environment.event()
-    environment.call_later(1, last.succeed)
-    assert last.callbacks is not None
-    last.callbacks.append(lambda _: os.kill(os.getpid(), signal.SIGINT))
-    with pytest.raises(KeyboardInterrupt):
-        environment.run(until=last)
-    environment.run()
-
-
-def test_a_second_signal_ends_what_never_comes_back() -> None:
-    def never_comes_back() -> None:
-        while True:
-            os.kill(os.getpid(), signal.SIGINT)
-
-    environment = VirtualEnvironment()
-    environment.post(never_comes_back)
-    with pytest.raises(KeyboardInterrupt):
-        environment.run()

@@ -10,6 +10,8 @@ from two_sessions import TwoSessions, types
 
 from reconros_zenoh.errors import UsageError
 from reconros_zenoh.rmw.parameters import Parameters
+from reconros_zenoh.ros.graph import EndpointKind, EndpointToken, parse
+from reconros_zenoh.ros.qos import QosProfile
 
 VALUES: dict[str, Any] = {
     "flag": True,
@@ -144,3 +146,94 @@ def test_what_no_parameter_can_be(value: Any) -> None:
 def test_declared_twice(remote: Remote) -> None:
     with pytest.raises(UsageError, match="declared already"):
         remote.parameters.declare("flag", False)
+
+
+class Heard:
+    """What comes on /parameter_events in the other session: new and changed parameters, by node."""
+
+    def __init__(self, remote: Remote) -> None:
+        self._remote = remote
+        self._events: list[Any] = []
+        remote.sessions.there.node("listener").subscription(
+            types().message("rcl_interfaces/msg/ParameterEvent"),
+            "/parameter_events",
+            lambda received: self._events.append(received.message),
+        )
+        remote.sessions.settle()
+
+    def take(self) -> list[tuple[str, list[str], list[str]]]:
+        self._remote.sessions.settle()
+        events, self._events[:] = list(self._events), []
+        return [
+            (
+                event.node,
+                [parameter.name for parameter in event.new_parameters],
+                [
+                    f"{parameter.name}={parameter.value.integer_value}"
+                    for parameter in event.changed_parameters
+                ],
+            )
+            for event in events
+        ]
+
+
+def test_what_is_declared_and_set_is_published() -> None:
+    remote = Remote()
+    heard = Heard(remote)
+    for name in ("a", "b"):
+        remote.parameters.declare(name, 1)
+    assert heard.take() == [("/arm/motor", ["a"], []), ("/arm/motor", ["b"], [])]
+    remote.parameters.set("a", 2)
+    assert heard.take() == [("/arm/motor", [], ["a=2"])]
+    remote.set("SetParameters", a=3, b=4)
+    assert heard.take() == [("/arm/motor", [], ["a=3"]), ("/arm/motor", [], ["b=4"])]
+    remote.set("SetParametersAtomically", a=5, b=6)
+    assert heard.take() == [("/arm/motor", [], ["a=5", "b=6"])]
+
+
+def test_what_is_refused_is_not_published() -> None:
+    remote = Remote()
+    remote.parameters.declare("a", 1)
+    heard = Heard(remote)
+    remote.set("SetParameters", a="word", unknown=1)
+    remote.set("SetParametersAtomically", a=2, unknown=1)
+    remote.ask("SetParametersAtomically", parameters=[])
+    with pytest.raises(UsageError):
+        remote.parameters.set("a", "word")
+    assert heard.take() == []
+
+
+def test_an_event_has_the_time_of_its_nodes_clock_and_the_qos_of_ros_2() -> None:
+    remote = Remote()
+    stamps: list[tuple[int, int]] = []
+    remote.sessions.there.node("listener").subscription(
+        types().message("rcl_interfaces/msg/ParameterEvent"),
+        "/parameter_events",
+        lambda received: stamps.append((received.message.stamp.sec, received.message.stamp.nanosec)),
+    )
+    remote.sessions.settle()
+    remote.sessions.here_ns = 3_000_000_007
+    remote.parameters.declare("a", 1)
+    remote.sessions.settle()
+    assert stamps == [(3, 7)]
+    (publisher,) = (
+        token
+        for token in map(parse, remote.sessions.tokens())
+        if isinstance(token, EndpointToken) and token.kind is EndpointKind.PUBLISHER
+    )
+    assert (publisher.name, publisher.qos) == ("/parameter_events", QosProfile(depth=1000))
+
+
+def test_who_hears_of_a_parameter_within_the_call_may_set_another(monkeypatch: pytest.MonkeyPatch) -> None:
+    remote = Remote()
+    parameters = remote.parameters
+    for name in ("a", "b"):
+        parameters.declare(name, 1)
+
+    def follow(event: Any) -> None:
+        if [parameter.name for parameter in event.changed_parameters] == ["a"]:
+            parameters.set("b", parameters.get("a"))
+
+    monkeypatch.setattr(parameters._events, "publish", follow)  # as a transport may deliver in one session
+    parameters.set("a", 2)
+    assert parameters.get("b") == 2

@@ -171,15 +171,20 @@ def test_which_arrays_are_not_copied(kind: MessageType) -> None:
 
 
 @pytest.mark.parametrize("size", [0, 4, 65532, 65536, 65540, 921600])
-def test_a_big_array_is_a_part_of_its_own_and_not_copied(size: int) -> None:
+@pytest.mark.parametrize(("writeable", "joined_at_once"), [(False, False), (True, True), (True, False)])
+def test_a_big_array_is_a_part_of_its_own_and_copied_only_where_somebody_could_change_it(
+    size: int, writeable: bool, joined_at_once: bool
+) -> None:
     for kind, dtype in ((SORT, np.dtype(np.uint32)), (IMAGE, np.dtype(np.uint8))):
         array = np.arange(size // dtype.itemsize).astype(dtype)
+        array.flags.writeable = writeable
         message = kind.cls(array) if kind is SORT else image(array)
-        parts = kind.encode(message)
+        parts = kind.encode(message, joined_at_once=joined_at_once)
         assert len(parts) == (2 if size >= 65536 else 1)
         assert b"".join(parts) == rosbags_bytes(kind, message)
         if len(parts) == 2:
-            assert np.shares_memory(np.frombuffer(parts[1], np.uint8), array)
+            is_view = np.shares_memory(np.frombuffer(parts[1], np.uint8), array)
+            assert is_view == (not writeable or joined_at_once)
         assert isinstance(parts[0], bytes)
 
 
