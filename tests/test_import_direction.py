@@ -48,7 +48,7 @@ BEHIND_THE_WAIST = tuple(
     f"reconros_zenoh.{package}"
     for package in ("rmw", "board", "project", "mapping", "measure", "applications")
 )
-MAY_IMPORT_ZENOH = ("reconros_zenoh.transport.zenoh",)
+MAY_IMPORT_ZENOH = ("reconros_zenoh.transport.zenoh", "reconros_zenoh.transport.zenoh_session")
 MAY_IMPORT_ZENOH_TRANSPORT = (
     "board_daemon",
     "host_clients",

@@ -1,4 +1,4 @@
-"""The transport over Zenoh, configured as rmw_zenoh has it; the only file that imports zenoh.
+"""The transport over Zenoh; this file and zenoh_session.py are the only ones that import zenoh.
 
 Callbacks run directly on Zenoh's network threads, all but one kind: a thread of its own for each declaration
 costs a change of thread per message (20 us of a round trip of 290 us).
@@ -6,28 +6,24 @@ costs a change of thread per message (20 us of a round trip of 290 us).
 
 from __future__ import annotations
 
-import ctypes
 import json
-import os
 import re
-import sys
-import threading
 from contextlib import suppress
 from functools import partial
-from typing import TYPE_CHECKING, Any, Self, TypeVar
+from typing import TYPE_CHECKING, Any, Self
 
 import zenoh
 from zenoh import ext
 from zenoh.handlers import Callback
-from zenoh.shm import GarbageCollect, ShmProvider, ZShmMut
 
-from reconros_zenoh.errors import TransportError, UsageError
+from reconros_zenoh.errors import TransportError
 from reconros_zenoh.ros.qos import Durability, History, Reliability
 from reconros_zenoh.transport.base import Reply
 from reconros_zenoh.transport.changes import MatchingChanges, TokenChanges, gather
 from reconros_zenoh.transport.frames import Frames
 from reconros_zenoh.transport.guard import Closing, GuardedDeclaration
 from reconros_zenoh.transport.key_expressions import check_concrete
+from reconros_zenoh.transport.zenoh_session import configuration, direct, open_pool
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -36,13 +32,6 @@ if TYPE_CHECKING:
     from reconros_zenoh.transport.base import OnMatching, OnReply, Parts, Request, Sample
 
 _HEARTBEAT_S = 0.5
-
-# One pool instead of a thread per stage nearly halves a round trip; of two threads, closing can have to wait.
-# A socket is watched by the pool that accepted it: were `acc` elsewhere, a message would wake a thread more.
-_THREADS = "(rx: (handover: net), tx: (handover: net), acc: (handover: net), net: (worker_threads: 4))"
-
-_T = TypeVar("_T")
-_thread = threading.local()
 
 
 class ZenohRouter(Closing):
@@ -57,7 +46,7 @@ class ZenohRouter(Closing):
 
         Raises TransportError when it cannot listen there, UsageError when `listen` is not an endpoint.
         """
-        config = _config("router", {"listen/endpoints": listen})
+        config = configuration("router", {"listen/endpoints": listen})
         config.insert_json5("scouting/delay", "0")  # else it scouts half a second for nobody
         try:
             return cls(zenoh.open(config))
@@ -81,7 +70,7 @@ class ZenohTransport(Closing):
         self.session_id = str(session.zid())
         self.session = session
         self.declarations: set[_Declaration] = set()
-        self.frames = Frames(_open_pool)
+        self.frames = Frames(open_pool)
 
     @classmethod
     def open(cls, router: str, *, timeout_s: float = 3.0) -> Self:
@@ -89,7 +78,7 @@ class ZenohTransport(Closing):
 
         Raises TransportError when no router answers, UsageError when `router` is not an endpoint.
         """
-        config = _config("peer", {"connect/endpoints": router, "listen/endpoints": "tcp/127.0.0.1:0"})
+        config = configuration("peer", {"connect/endpoints": router, "listen/endpoints": "tcp/127.0.0.1:0"})
         config.insert_json5("connect/timeout_ms", json.dumps(max(1, round(timeout_s * 1000))))
         config.insert_json5("connect/exit_on_failure", "true")
         config.insert_json5("connect/retry", "{period_init_ms: 100, period_max_ms: 1000}")
@@ -115,7 +104,7 @@ class ZenohTransport(Closing):
                     except Exception:  # noqa: BLE001 # as in `call`
                         declaration.log_failure()
 
-        handler = _direct(on_sample)
+        handler = direct(on_sample)
         if qos.durability is Durability.TRANSIENT_LOCAL:
             reliable = qos.reliability is Reliability.RELIABLE
             declaration.add(
@@ -139,7 +128,7 @@ class ZenohTransport(Closing):
         def on_query(query: zenoh.Query) -> None:
             declaration.call(sink, _Request(str(query.key_expr) if is_pattern else key, query, self))
 
-        handler = _direct(on_query)
+        handler = direct(on_query)
         declaration.add(self.session.declare_queryable, key, handler, complete=True)
         return declaration
 
@@ -168,7 +157,7 @@ class ZenohTransport(Closing):
         def on_sample(sample: zenoh.Sample) -> None:
             declaration.call(changes.report, str(sample.key_expr), sample.kind == zenoh.SampleKind.PUT)
 
-        handler = _direct(on_sample)
+        handler = direct(on_sample)
         declaration.add(self.session.liveliness().declare_subscriber, key, handler, history=True)
         return declaration
 
@@ -330,7 +319,7 @@ class _Querier(_Declaration):
 
     def get(self, parts: Parts, attachment: bytes | None, on_reply: OnReply, timeout_ns: int) -> None:
         self.check_open()
-        handler = _direct(partial(self._take, on_reply), partial(self.call, on_reply, None))
+        handler = direct(partial(self._take, on_reply), partial(self.call, on_reply, None))
         try:
             # A Zenoh querier has one timeout for all; a get of the session has its own and costs the same.
             self._transport.session.get(
@@ -351,57 +340,6 @@ class _Querier(_Declaration):
             self.call(on_reply, Reply(payload, _bytes(sample.attachment), None))
         elif (error := reply.err) is not None and not _is_timeout(reply, error):
             self.call(on_reply, Reply(None, None, error.payload.to_string()))
-
-
-def _direct(callback: Callable[[_T], None], drop: Callable[[], None] | None = None) -> Callback[_T]:
-    """Return a handler that runs on Zenoh's threads.
-
-    For a thread that it has not started, Python makes a thread state at every callback, maps memory for its
-    frames, and unmaps that at the end, which interrupts the other cores: a twentieth of a small round trip.
-    Asked for once more, the state stays as long as the thread.
-    """
-
-    def call(argument: _T) -> None:
-        if not hasattr(_thread, "has_state"):
-            _thread.has_state = True
-            ctypes.pythonapi.PyGILState_Ensure()
-        callback(argument)
-
-    return Callback(call, drop, indirect=False)
-
-
-def _open_pool(pool_bytes: int) -> Callable[[int], ZShmMut | None] | None:
-    try:
-        pool = ShmProvider.default_backend(pool_bytes)
-    except zenoh.ZError:
-        return None
-
-    def allocate(size: int) -> ZShmMut | None:
-        # It does not wait (BlockOn): a reader that keeps its samples would stop the publisher.
-        for _ in range(2):  # what the first try collects may suffice for the second only
-            with suppress(zenoh.ZError):
-                return pool.alloc(size, GarbageCollect())
-        return None
-
-    return allocate
-
-
-def _config(mode: str, endpoints: dict[str, str]) -> zenoh.Config:
-    """Return the configuration of rmw_zenoh (gossip is on); raises UsageError when an endpoint is none."""
-    os.environ.setdefault("ZENOH_RUNTIME", _THREADS)  # read when the first session of a process opens
-    config = zenoh.Config()
-    config.insert_json5("mode", json.dumps(mode))
-    for entry, endpoint in endpoints.items():
-        try:
-            config.insert_json5(entry, json.dumps([endpoint]))
-        except zenoh.ZError as error:
-            raise UsageError(f"{endpoint!r} is not a Zenoh endpoint such as tcp/127.0.0.1:7447") from error
-    config.insert_json5("scouting/multicast/enabled", "false")
-    config.insert_json5("timestamping/enabled", "true")  # the caches of transient local publishers need it
-    # With shared memory switched on and none to be had, a session does not open.
-    shared = sys.platform != "linux" or os.access("/dev/shm", os.W_OK)  # noqa: S108 # only looked at
-    config.insert_json5("transport/shared_memory/enabled", json.dumps(shared))
-    return config
 
 
 def _bytes(value: zenoh.ZBytes | None) -> bytes | None:
