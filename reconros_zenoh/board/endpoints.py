@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
@@ -27,8 +26,7 @@ if TYPE_CHECKING:
     from reconros_zenoh.transport.base import Parts
 
 
-@dataclass(frozen=True, slots=True)
-class Event:
+class Event(NamedTuple):
     """What a worker takes: the message of the callback (None for a timer) and its timeline so far.
 
     `message_type` is None for what has no place in memory as a C struct. `in_slot`: it came over a
@@ -297,8 +295,7 @@ class TimerSource:
             on_ready()
 
 
-@dataclass(frozen=True, slots=True)
-class _Outgoing:
+class _Outgoing(NamedTuple):
     send: Callable[[], None]
     size: int
     timeline: Timeline
