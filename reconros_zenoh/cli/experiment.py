@@ -24,6 +24,8 @@ from reconros_zenoh.experiments.roundtrip import (
     prepare,
 )
 from reconros_zenoh.measure.compare import print_tables
+from reconros_zenoh.measure.plots import write_grid
+from reconros_zenoh.measure.run import load_run
 from reconros_zenoh.project.loader import load_project
 
 app = typer.Typer(help="Run an experiment of the papers on emulated boards.", no_args_is_help=True)
@@ -54,14 +56,21 @@ def roundtrip(
 ) -> None:
     """Section V-C: five clients against one board, under each mapping; beside the real board's round trips.
 
+    Writes the records, experiment.json and roundtrips.png, the histograms of Fig. 6.
+
     Exit status 0 only if every answer was right and nothing was lost.
     """
-    experiment = run(plan(clock, mapping or MAPPINGS, requests, seed, out, profile), quiet=as_json)
+    planned = plan(clock, mapping or MAPPINGS, requests, seed, out, profile)
+    experiment = run(planned, quiet=as_json)
     if as_json:
         print(json.dumps(experiment))
     else:
         print_tables(Console(), experiment)
-        print(f"records and experiment.json are in {out / clock}")
+        print(f"records and experiment.json are in {planned.folder}")
+    if experiment["mappings"]:
+        write_grid(planned.drawing, load_run(planned.folder)[1])
+        if not as_json:
+            print(f"drawn to {planned.drawing}")
     if experiment["interrupted"]:
         raise typer.Exit(130)
     raise typer.Exit(0 if all_right(experiment) else 1)

@@ -44,6 +44,7 @@ def main() -> None:
     end.
     """
     logging.basicConfig(level=logging.INFO, format="%(levelname)s %(name)s: %(message)s")
+    logging.getLogger("matplotlib").setLevel(logging.ERROR)  # where its fonts are is nobody's concern
     signal.signal(signal.SIGTERM, _end)
     # A verb imports what it needs itself: the others' imports would double its start.
     given = sys.argv[1] if len(sys.argv) > 1 else ""

@@ -139,6 +139,12 @@ def test_links_lead_somewhere(page: Path) -> None:
     assert [target for target in targets if not (page.parent / target).exists()] == []
 
 
+def test_pictures_of_the_pages_are_small() -> None:
+    pictures = [path for path in (ROOT / "docs").iterdir() if path.suffix != ".md"]
+    assert pictures
+    assert {path.name: path.stat().st_size for path in pictures if path.stat().st_size > 150_000} == {}
+
+
 def readme_commands() -> list[str]:
     """Return the command lines of README.md."""
     lines = [line for block in blocks(ROOT / "README.md") for line in block.text.splitlines()]
