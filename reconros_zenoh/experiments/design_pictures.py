@@ -7,18 +7,18 @@ from typing import TYPE_CHECKING
 import cv2
 
 from reconros_zenoh.applications.design_example.picture import moving_picture
-from reconros_zenoh.experiments.design import VARIANTS
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
     from pathlib import Path
 
     from reconros_zenoh.experiments.design import DesignPlan
     from reconros_zenoh.measure.design_report import Picture
 
 
-def pictures_of(plan: DesignPlan) -> dict[str, list[Picture]]:
+def pictures_of(plan: DesignPlan, variants: Iterable[str]) -> dict[str, list[Picture]]:
     """Return for each variant the first and the last picture that came back, each behind what was sent."""
-    return {variant: _pictures(plan.variant_folder(variant)) for variant in VARIANTS}
+    return {variant: _pictures(plan.variant_folder(variant)) for variant in variants}
 
 
 def _pictures(folder: Path) -> list[Picture]:

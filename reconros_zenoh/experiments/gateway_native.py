@@ -29,7 +29,8 @@ from reconros_zenoh.clock.virtual import succeed_once
 from reconros_zenoh.clock.wall import WallEnvironment, keep_time
 from reconros_zenoh.errors import ExperimentError
 from reconros_zenoh.executor.callbacks import CallbackKind
-from reconros_zenoh.experiments.gateway import Cell, Times, Variant, host, setup_mapping, until_interrupted
+from reconros_zenoh.experiments.gateway import Cell, Times, Variant, host, setup_mapping
+from reconros_zenoh.experiments.interruption import until_interrupted
 from reconros_zenoh.experiments.wall import free_port
 from reconros_zenoh.project.loader import load_project
 from reconros_zenoh.project.mapping_file import CallbackMapping
