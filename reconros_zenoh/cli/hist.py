@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from pathlib import Path
 from typing import Annotated
 
@@ -67,7 +68,7 @@ def hist(
 def _load(paths: list[Path]) -> list[NamedRecord]:
     files = [file for path in paths for file in (find_records(path) if path.is_dir() else [path])]
     # A second way to the same file is not a second record.
-    files = list({file.resolve(): file for file in reversed(files)}.values())[::-1]
+    files = list({os.path.realpath(file): file for file in reversed(files)}.values())[::-1]
     return [
         NamedRecord(name, file, read_record(file))
         for name, file in zip(short_names(files), files, strict=True)
