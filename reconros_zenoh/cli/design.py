@@ -12,6 +12,7 @@ from rich.console import Console
 from rich.table import Table
 
 from reconros_zenoh.board.profile import read_profile
+from reconros_zenoh.cli.console import wide_console
 from reconros_zenoh.cli.options import AsJson, ClockName, Out, Profile, Seed
 from reconros_zenoh.cli.progress import run_bar
 from reconros_zenoh.errors import UsageError
@@ -97,7 +98,7 @@ def design(
     if as_json:
         print(json.dumps(experiment))
     elif variants:
-        _print_table(Console(), variants)
+        _print_table(wide_console(), variants)
         print(f"report: {plan.folder / REPORT}")
     if interruption.happened:
         if not as_json:

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from rich.console import Console
 
+from reconros_zenoh.cli.console import wide_console
 from reconros_zenoh.cli.design import design
 from reconros_zenoh.cli.gateway_experiment import gateway
 from reconros_zenoh.cli.options import AsJson, ClockName, Out, Profile, Seed
@@ -66,7 +66,7 @@ def roundtrip(
     if as_json:
         print(json.dumps(experiment))
     else:
-        print_tables(Console(), experiment)
+        print_tables(wide_console(), experiment)
         print(f"records and experiment.json are in {planned.folder}")
     if experiment["mappings"]:
         write_grid(planned.drawing, load_run(planned.folder)[1])

@@ -9,15 +9,17 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.box import SIMPLE_HEAD
-from rich.console import Console
 from rich.table import Table
 
+from reconros_zenoh.cli.console import wide_console
 from reconros_zenoh.cli.options import AsJson, ClockName, Out, Profile
 from reconros_zenoh.cli.progress import run_bar
 from reconros_zenoh.errors import UsageError
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
+
+    from rich.console import Console
 
     from reconros_zenoh.experiments.roundtrip import Clock
 
@@ -73,7 +75,7 @@ def gateway(
     if as_json:
         print(json.dumps(result))
     else:
-        _print(Console(), result)
+        _print(wide_console(), result)
         print(f"drawings and gateway.json: {', '.join(map(str, paths))}")
     if result["interrupted"]:
         raise typer.Exit(130)

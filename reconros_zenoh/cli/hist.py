@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 
+from reconros_zenoh.cli.console import wide_console
 from reconros_zenoh.errors import UsageError
 from reconros_zenoh.measure.histogram import NamedRecord, describe, print_histogram
 from reconros_zenoh.measure.plots import write_histograms
@@ -56,7 +56,7 @@ def hist(
     if as_json:
         print(json.dumps({"records": [describe(entry, other, bins) for entry, other in pairs]}, indent=2))
         return
-    console = Console()
+    console = wide_console(60)
     for entry, other in pairs:
         print_histogram(console, entry, other, bins)
     if alone := [entry.name for entry, other in pairs if compare and not other]:

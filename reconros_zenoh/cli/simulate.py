@@ -15,6 +15,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeElapsedCo
 from rich.table import Table
 from rich.text import Text
 
+from reconros_zenoh.cli.console import wide_console
 from reconros_zenoh.cli.options import AsJson, project_prints
 from reconros_zenoh.cli.service_commands import read_deployment
 from reconros_zenoh.experiments.deployment import DeploymentRun, prepare
@@ -73,7 +74,7 @@ def simulate(
     if as_json:
         print(json.dumps({"file": str(file), "simulated_s": run.simulated_ns / 1e9, "boards": summaries}))
     else:
-        _print_table(Console(), summaries)
+        _print_table(wide_console(), summaries)
         print(f"{run.simulated_ns / 1e9:.1f} s of virtual time; the records are in {out}")
     raise typer.Exit(0 if run.all_right() else 1)
 

@@ -8,16 +8,18 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.box import SIMPLE_HEAD
-from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from reconros_zenoh.cli.console import wide_console
 from reconros_zenoh.cli.options import ClockName, Profile
 from reconros_zenoh.cli.progress import run_bar
 from reconros_zenoh.measure.statistics import format_error, format_ms, format_share
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
+
+    from rich.console import Console
 
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
 Clock = Annotated[ClockName, typer.Option(help="Real time on this host, or virtual time.")]
@@ -49,7 +51,7 @@ def callbacks(
     if as_json:
         print(json.dumps(result))
         return
-    console = Console()
+    console = wide_console()
     _print_callbacks(console, result)
     if clock is ClockName.WALL:
         _print_host(console, result)
@@ -80,7 +82,7 @@ def reconfiguration(
     if as_json:
         print(json.dumps(result))
         return
-    console = Console()
+    console = wide_console()
     _print_slots(console, result)
     _print_regression(console, result)
     _print_what_if(console, result)
