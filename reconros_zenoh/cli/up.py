@@ -44,7 +44,7 @@ def up(
                 start_supervisor(file, folder, environment, screen.show)
             else:
                 supervise(deployment, folder, environment, screen.show)
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, SystemExit):  # the latter is SIGTERM or SIGHUP (`EndingSignals`)
         failure, error = typer.Exit(130), "interrupted"
     except ExperimentError as caught:
         failure, error = caught, str(caught)
