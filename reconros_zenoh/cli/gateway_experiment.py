@@ -96,12 +96,13 @@ def _prepare(out: Path) -> None:
 
 def _write(out: Path, result: dict[str, Any]) -> list[Path]:
     from reconros_zenoh.measure.gateway_plots import transmission_figure
+    from reconros_zenoh.measure.plots import write_figure
 
     (out / _RESULT).write_text(json.dumps(result, indent=2) + "\n", encoding="utf-8")
     paths = []
     for publisher in dict.fromkeys(cell["publisher"] for cell in result["cells"]):
         paths.append(out / _FIGURES[publisher])
-        transmission_figure(result["cells"], publisher).savefig(paths[-1], dpi=120)
+        write_figure(transmission_figure(result["cells"], publisher), paths[-1])
     return paths
 
 

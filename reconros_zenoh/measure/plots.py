@@ -63,7 +63,7 @@ def grid_figure(records: Mapping[str, Mapping[str, Record]]) -> Figure:
 
     clients = list(dict.fromkeys(client for row in records.values() for client in row))
     colours = [_MAPPING_COLOURS[row % len(_MAPPING_COLOURS)] for row in range(len(records))]
-    with _style():
+    with drawing_style():
         figure = Figure(figsize=(1.85 * len(clients) + 0.75, 1.7 * len(records) + 0.7), layout="constrained")
         grid = figure.subplots(len(records), len(clients), squeeze=False)
         for column, client in enumerate(clients):
@@ -99,7 +99,7 @@ def spans_figure(spans: Mapping[str, Mapping[str, Mapping[str, float]]]) -> Figu
     clients = list(dict.fromkeys(client for row in spans.values() for client in row))
     colours = _stage_colours(stage for row in spans.values() for cell in row.values() for stage in cell)
     places = range(len(spans))
-    with _style():
+    with drawing_style():
         figure = Figure(figsize=(2.7 * len(clients) + 1.5, 0.45 * len(spans) + 1.3), layout="constrained")
         grid = figure.subplots(1, len(clients), squeeze=False, sharey=True)[0]
         for axes, client in zip(grid, clients, strict=True):
@@ -130,7 +130,7 @@ def write_grid(path: Path, records: Mapping[str, Mapping[str, Record]]) -> None:
     """
     if not any(records.values()):
         raise UsageError(f"{path}: there is no record to draw. Run the experiment first.")
-    _save(grid_figure(records), path, ("png", "svg"))
+    write_figure(grid_figure(records), path, ("png", "svg"))
 
 
 def write_histograms(path: Path, pairs: Sequence[tuple[NamedRecord, NamedRecord | None]], bins: int) -> None:
@@ -142,7 +142,7 @@ def write_histograms(path: Path, pairs: Sequence[tuple[NamedRecord, NamedRecord 
 
     columns = min(len(pairs), 3)
     rows = -(-len(pairs) // columns)
-    with _style():
+    with drawing_style():
         figure = Figure(figsize=(4.2 * columns + 0.5, 2.4 * rows + 0.8), layout="constrained")
         grid = figure.subplots(rows, columns, squeeze=False).flatten()
         for axes, (entry, other) in zip(grid, pairs, strict=False):
@@ -159,12 +159,12 @@ def write_histograms(path: Path, pairs: Sequence[tuple[NamedRecord, NamedRecord 
         figure.supylabel("relative frequency")
         behind_any = "compared with" if any(other for _, other in pairs) else None
         _legend(figure, "record", behind_any, _MAPPING_COLOURS[1:2])
-    _save(figure, path, ("png",))
+    write_figure(figure, path)
 
 
 def draw_histogram(axes: Axes, record: Record, edges_ms: npt.NDArray[np.float64], title: str) -> None:
     """Draw the record's histogram with its mean, and its median above it."""
-    with _style():
+    with drawing_style():
         _panel(axes, edges_ms, record, None, _MAPPING_COLOURS[1])
         axes.set_title(f"{_wrap(title, 42)}\n", loc="left", fontweight="bold")
         axes.set_title(_medians(record, "other", None), loc="right", fontsize=8)
@@ -177,7 +177,7 @@ def inline_svg(figure: Figure) -> str:
     dark scheme.
     """
     buffer = io.StringIO()
-    with _style():
+    with drawing_style():
         figure.savefig(buffer, format="svg", transparent=True, metadata={"Date": None})
     svg = buffer.getvalue()
     svg = svg[svg.index("<svg") :]
@@ -187,14 +187,18 @@ def inline_svg(figure: Figure) -> str:
     return svg.replace(INK, "var(--ink)").replace(GREY, "var(--grey)")
 
 
-def _save(figure: Figure, path: Path, formats: Sequence[str]) -> None:
+def write_figure(figure: Figure, path: Path, formats: Sequence[str] = ("png",)) -> None:
+    """Write the figure in the format that the file's suffix names, one of these.
+
+    Raises UsageError for another suffix or if the file cannot be written.
+    """
     suffix = path.suffix.lower().removeprefix(".")
     if suffix not in formats:
         raise UsageError(
             f"{path}: drawings are written as {' or '.join(formats)}. Name the file *.{formats[0]}."
         )
     buffer = io.BytesIO()
-    with _style():
+    with drawing_style():
         figure.savefig(buffer, format=suffix, dpi=160)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -211,7 +215,8 @@ def _save(figure: Figure, path: Path, formats: Sequence[str]) -> None:
         ) from error
 
 
-def _style() -> AbstractContextManager[None]:
+def drawing_style() -> AbstractContextManager[None]:
+    """Return a context in which figures look alike; they are drawn in it and written in it."""
     import matplotlib as mpl  # noqa: PLC0415  see the module docstring
 
     return mpl.rc_context(
