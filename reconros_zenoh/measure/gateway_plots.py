@@ -74,10 +74,8 @@ def _legend(figure: Figure, counts: Sequence[int]) -> None:
 
     handles = [Line2D([], [], color=colour, label=name) for name, colour in _VARIANTS.values()]
     handles += [
-        Line2D(
-            [], [], color=INK, linestyle=_LINES[number % len(_LINES)], label=f"{count} hardware subscribers"
-        )
-        for number, count in enumerate(counts)
+        Line2D([], [], color=INK, linestyle=style, label=f"hardware subscribers: {count}")
+        for style, count in zip(cycle(_LINES), counts, strict=False)
     ]
     figure.legend(handles=handles, loc="outside upper right", ncols=len(handles))
 
