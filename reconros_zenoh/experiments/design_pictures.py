@@ -24,7 +24,7 @@ def pictures_of(plan: DesignPlan, variants: Iterable[str]) -> dict[str, list[Pic
 def _pictures(folder: Path) -> list[Picture]:
     lines = (folder / "filter.csv").read_text(encoding="utf-8").splitlines()[1:]
     numbers = [int(line.split(",")[0]) for line in lines if not line.endswith("lost")]
-    if not numbers:
+    if not numbers or not (folder / "last.png").exists():  # a viewer that was killed leaves none
         return []
     shown: list[Picture] = []
     for name, number in (("first", numbers[0]), ("last", numbers[-1])):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from concurrent.futures import ThreadPoolExecutor
 from signal import SIGINT, SIGTERM, Signals
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -220,7 +221,8 @@ def test_an_interrupted_experiment_in_virtual_time_keeps_its_records(tmp_path: P
     arguments = ("--clock=virtual", "--mapping=all_hardware", ENDLESS, "--out", tmp_path)
     with Process(*ROUND_TRIP, *arguments) as experiment:
         experiment.wait_for("virtual time, all_hardware: 5000000 round trips ...")
-        assert experiment.end(number) == 130
+        os.kill(experiment.pid, number)
+        assert experiment.end(number) == 130  # some press Ctrl-C more than once
         cells = _interrupted(tmp_path, "virtual")
         assert sum(cell["n"] for cell in cells.values()) > 0
         assert "Traceback" not in repr(experiment)
