@@ -16,11 +16,11 @@ _NUMBERS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 class EndingSignals:
     """SIGINT, SIGTERM and SIGHUP as exceptions that come at a good moment.
 
-    The first one raises KeyboardInterrupt (SIGINT) or SystemExit(128 + number): at once, or at the end of
-    `held()` when it comes within. Further ones are only counted, so that they cannot interrupt the clean-up
-    that the first one began. `wake` is called for each, from a signal handler: it must be reentrant. A signal
-    that the process ignores stays ignored. Thread rule: only the main thread can take signals; in another one
-    this object does nothing.
+    The first one raises what the handler before it raises, else KeyboardInterrupt (SIGINT) or
+    SystemExit(128 + number): at once, or at the end of `held()` when it comes within. Further ones are only
+    counted, so that they cannot interrupt the clean-up that the first one began. `wake` is called for each,
+    from a signal handler: it must be reentrant. A signal that the process ignores stays ignored. Thread rule:
+    only the main thread can take signals; in another one this object does nothing.
     """
 
     def __init__(self, wake: Callable[[], None]) -> None:
@@ -69,6 +69,9 @@ class EndingSignals:
 
     def _raise_pending(self) -> None:
         number, self._pending = self._pending, None
+        former = self._former.get(number) if number is not None else None
+        if callable(former):
+            former(number, None)  # raises too, and knows from then on that the end has come
         if number is signal.SIGINT:
             raise KeyboardInterrupt
         if number is not None:

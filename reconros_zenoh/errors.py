@@ -21,6 +21,9 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 
+_LONG = 600
+
+
 class ReconrosError(Exception):
     """Base of all errors of this project; `str()` is one or more plain sentences for the user."""
 
@@ -33,6 +36,8 @@ class FileError(UsageError):
     """A file that cannot be used: `path:line: what is wrong. Remedy.`."""
 
     def __init__(self, path: Path | str, line: int | None, problem: str, remedy: str = "") -> None:
+        if len(problem) > _LONG:  # it quotes the file, which may hold anything
+            problem = f"{problem[: _LONG // 2]} ... {problem[-_LONG // 2 :]}"
         self.path = path
         self.line = line
         self.problem = problem

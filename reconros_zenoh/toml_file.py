@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from reconros_zenoh.errors import FileError
+from reconros_zenoh.text_file import read_text_file
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -25,10 +26,7 @@ class TomlFile:
     @classmethod
     def read(cls, path: Path) -> TomlFile:
         """Return the file; raise FileError with the line when it cannot be read or is not TOML."""
-        try:
-            text = path.read_text(encoding="utf-8")
-        except (OSError, UnicodeDecodeError) as error:
-            raise FileError(path, None, f"cannot be read ({error}).", "Give a readable TOML file.") from None
+        text = read_text_file(path, "Give a readable TOML file.")
         try:
             return cls(path, tomllib.loads(text), text)
         except tomllib.TOMLDecodeError as error:

@@ -12,6 +12,7 @@ from ruamel.yaml.error import MarkedYAMLError, YAMLError
 from ruamel.yaml.reader import ReaderError
 
 from reconros_zenoh.errors import FileError
+from reconros_zenoh.text_file import read_text_file
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -43,10 +44,7 @@ class Node:
     @classmethod
     def read(cls, path: Path, environment: Mapping[str, str]) -> Node:
         """Return the whole file; raise FileError when it cannot be read or is not YAML."""
-        try:
-            text = path.read_text(encoding="utf-8")
-        except (OSError, UnicodeDecodeError) as error:
-            raise FileError(path, None, f"cannot be read ({error}).", "Give a readable YAML file.") from None
+        text = read_text_file(path, "Give a readable YAML file.")
         try:
             value = YAML(typ="rt").load(text)
         except ReaderError as error:

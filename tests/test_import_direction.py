@@ -22,7 +22,12 @@ MOST_LINES = 400
 
 # From top to bottom: a module may import from its own line and from those above.
 ORDER = (
-    ("reconros_zenoh.errors", "reconros_zenoh.toml_file", "reconros_zenoh.yaml_node"),
+    (
+        "reconros_zenoh.errors",
+        "reconros_zenoh.text_file",
+        "reconros_zenoh.toml_file",
+        "reconros_zenoh.yaml_node",
+    ),
     ("reconros_zenoh.executor",),
     ("reconros_zenoh.gateway",),
     ("reconros_zenoh.clock",),

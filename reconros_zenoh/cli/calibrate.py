@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.box import SIMPLE_HEAD
-from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
 from reconros_zenoh.board.profile import read_profile
+from reconros_zenoh.cli.console import wide_console
 from reconros_zenoh.cli.options import AsJson
 from reconros_zenoh.cli.progress import run_bar
 from reconros_zenoh.errors import UsageError
@@ -29,6 +29,9 @@ from reconros_zenoh.experiments.roundtrip import application_folder
 from reconros_zenoh.measure.compare import grade
 from reconros_zenoh.measure.statistics import format_error, format_ms
 from reconros_zenoh.project.loader import load_project
+
+if TYPE_CHECKING:
+    from rich.console import Console
 
 
 def calibrate(
@@ -86,7 +89,7 @@ def calibrate(
     if as_json:
         print(json.dumps(_object(found, out, requests, seed)))
     else:
-        _print(Console(), found)
+        _print(wide_console(), found)
         print(f"the fitted profile is {out}")
 
 

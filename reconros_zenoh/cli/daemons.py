@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 
 from reconros_zenoh.board.control import ask_status
+from reconros_zenoh.cli.console import wide_console
 from reconros_zenoh.cli.options import (
     ENDPOINT,
     AsJson,
@@ -135,4 +135,4 @@ def status(
     elif name == "router":
         print(f"a router listens on {router}")
     else:
-        print_status(Console(), answer)
+        print_status(wide_console(), answer)

@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 
 from reconros_zenoh.board.profile import read_profile
+from reconros_zenoh.cli.console import wide_console
 from reconros_zenoh.cli.experiment import MAPPINGS, plan, run
 from reconros_zenoh.cli.options import ClockName, Out
 from reconros_zenoh.cli.progress import run_bar
@@ -31,7 +31,7 @@ def demo(
 
     The report also says what each mechanism of the board model is worth: runs in virtual time without it.
     """
-    console = Console()
+    console = wide_console()
     experiments = []
     for clock, requests in ((ClockName.WALL, wall_requests), (ClockName.VIRTUAL, virtual_requests)):
         planned = plan(clock, MAPPINGS, requests, 0, out, _PROFILE)

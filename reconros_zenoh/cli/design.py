@@ -12,6 +12,7 @@ from rich.console import Console
 from rich.table import Table
 
 from reconros_zenoh.board.profile import read_profile
+from reconros_zenoh.cli.console import wide_console
 from reconros_zenoh.cli.options import AsJson, ClockName, Out, Profile, Seed
 from reconros_zenoh.cli.progress import run_bar
 from reconros_zenoh.errors import UsageError
@@ -48,10 +49,20 @@ def design(
 ) -> None:
     """Section IV: /filter and /inv_kinematics in one reconfigurable slot, and in two; writes report.html.
 
-    Exit status 0 only if pictures and servo indices came, and all that came were right.
+    Exit status 0 only if pictures and servo indices came, and all that came were right. Ctrl-C keeps what
+    was measured.
     """
-    from reconros_zenoh.experiments.design import VARIANTS, DesignPlan, all_right, finish, prepare
+    from reconros_zenoh.experiments.design import (
+        REPORT,
+        VARIANTS,
+        DesignPlan,
+        Ending,
+        all_right,
+        finish,
+        prepare,
+    )
     from reconros_zenoh.experiments.design_pictures import pictures_of
+    from reconros_zenoh.experiments.interruption import until_interrupted
     from reconros_zenoh.measure.design_report import write_design_report
 
     modelled = read_profile(profile).model is not None
@@ -63,11 +74,15 @@ def design(
         raise UsageError("--view shows pictures as they come, which needs --clock wall.")
     plan = DesignPlan(clock.value, seconds, seed, profile, out)
     prepare(plan)
-    with run_bar("design example", len(VARIANTS), quiet=as_json) as advance:
+    endings: dict[str, Ending] = {}
+    with (
+        run_bar("design example", len(VARIANTS), quiet=as_json) as advance,
+        until_interrupted() as interruption,
+    ):
         if clock is ClockName.VIRTUAL:
             from reconros_zenoh.experiments.design_virtual import run_design_virtual
 
-            statuses = run_design_virtual(plan, advance)
+            run_design_virtual(plan, endings, advance)
         else:
             from reconros_zenoh.experiments.design_wall import run_design_wall
             from reconros_zenoh.experiments.wall import free_port
@@ -75,15 +90,20 @@ def design(
             port = free_port() if view else None
             if view:
                 Console(stderr=True).print(f"the pictures are at http://127.0.0.1:{port}/")
-            statuses = run_design_wall(plan, advance, port)
-    experiment = finish(plan, statuses)
-    report = plan.folder / "report.html"
-    write_design_report(report, experiment, pictures_of(plan))
+            run_design_wall(plan, endings, advance, port)
+    experiment = finish(plan, endings, interrupted=interruption.happened)
+    variants = experiment["variants"]
+    if variants:
+        write_design_report(plan.folder / REPORT, experiment, pictures_of(plan, variants))
     if as_json:
         print(json.dumps(experiment))
-    else:
-        _print_table(Console(), experiment["variants"])
-        print(f"report: {report}")
+    elif variants:
+        _print_table(wide_console(), variants)
+        print(f"report: {plan.folder / REPORT}")
+    if interruption.happened:
+        if not as_json:
+            print(f"interrupted {'before its end' if variants else 'before anything was measured'}")
+        raise typer.Exit(130)
     raise typer.Exit(0 if all_right(experiment) else 1)
 
 
@@ -94,7 +114,7 @@ def _print_table(console: Console, variants: Mapping[str, Mapping[str, Any]]) ->
         table.add_column(variant, justify="right", no_wrap=True)
     for key, text in _ROWS.items():
         cells = (variant[key] for variant in variants.values())
-        table.add_row(text, *(format_ms(cell) if key.endswith("_ms") else str(cell) for cell in cells))
+        table.add_row(text, *(_cell(cell, key) for cell in cells))
     for chain, text in (("filter_ms", "camera to viewer"), ("control_ms", "command to servo index")):
         for point in ("median", "p95"):
             table.add_row(
@@ -102,3 +122,9 @@ def _print_table(console: Console, variants: Mapping[str, Mapping[str, Any]]) ->
             )
     console.print(table)
     console.print("Times in ms.", style="dim")
+
+
+def _cell(value: float | None, key: str) -> str:
+    if key.endswith("_ms"):
+        return format_ms(value)
+    return "-" if value is None else str(value)

@@ -7,14 +7,15 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from rich.console import Console
 
+from reconros_zenoh.cli.console import wide_console
 from reconros_zenoh.cli.design import design
 from reconros_zenoh.cli.gateway_experiment import gateway
 from reconros_zenoh.cli.options import AsJson, ClockName, Out, Profile, Seed
 from reconros_zenoh.cli.progress import ExperimentProgress
 from reconros_zenoh.cli.tables import callbacks, reconfiguration
 from reconros_zenoh.errors import UsageError
+from reconros_zenoh.experiments.interruption import until_interrupted
 from reconros_zenoh.experiments.roundtrip import (
     BoardReport,
     Plan,
@@ -24,6 +25,8 @@ from reconros_zenoh.experiments.roundtrip import (
     prepare,
 )
 from reconros_zenoh.measure.compare import print_tables
+from reconros_zenoh.measure.plots import write_grid
+from reconros_zenoh.measure.run import load_run
 from reconros_zenoh.project.loader import load_project
 
 app = typer.Typer(help="Run an experiment of the papers on emulated boards.", no_args_is_help=True)
@@ -54,14 +57,21 @@ def roundtrip(
 ) -> None:
     """Section V-C: five clients against one board, under each mapping; beside the real board's round trips.
 
+    Writes the records, experiment.json and roundtrips.png, the histograms of Fig. 6.
+
     Exit status 0 only if every answer was right and nothing was lost.
     """
-    experiment = run(plan(clock, mapping or MAPPINGS, requests, seed, out, profile), quiet=as_json)
+    planned = plan(clock, mapping or MAPPINGS, requests, seed, out, profile)
+    experiment = run(planned, quiet=as_json)
     if as_json:
         print(json.dumps(experiment))
     else:
-        print_tables(Console(), experiment)
-        print(f"records and experiment.json are in {out / clock}")
+        print_tables(wide_console(), experiment)
+        print(f"records and experiment.json are in {planned.folder}")
+    if experiment["mappings"]:
+        write_grid(planned.drawing, load_run(planned.folder)[1])
+        if not as_json:
+            print(f"drawn to {planned.drawing}")
     if experiment["interrupted"]:
         raise typer.Exit(130)
     raise typer.Exit(0 if all_right(experiment) else 1)
@@ -92,17 +102,13 @@ def run(plan: Plan, *, quiet: bool) -> dict[str, Any]:
     """Run the experiment and return its object; Ctrl-C keeps what was measured and marks it interrupted."""
     report = BoardReport()
     prepare(plan)
-    interrupted = False
-    with ExperimentProgress(plan, quiet=quiet) as progress:
-        try:
-            if plan.clock == "virtual":
-                from reconros_zenoh.experiments.virtual import run_virtual
+    with ExperimentProgress(plan, quiet=quiet) as progress, until_interrupted() as interruption:
+        if plan.clock == "virtual":
+            from reconros_zenoh.experiments.virtual import run_virtual
 
-                run_virtual(plan, report, progress.advance)
-            else:
-                from reconros_zenoh.experiments.wall import run_wall
+            run_virtual(plan, report, progress.advance)
+        else:
+            from reconros_zenoh.experiments.wall import run_wall
 
-                run_wall(plan, report, progress.advance)
-        except (KeyboardInterrupt, SystemExit):
-            interrupted = True
-    return finish(plan, report, interrupted=interrupted)
+            run_wall(plan, report, progress.advance)
+    return finish(plan, report, interrupted=interruption.happened)

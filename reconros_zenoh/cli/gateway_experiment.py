@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.box import SIMPLE_HEAD
-from rich.console import Console
 from rich.table import Table
 
+from reconros_zenoh.cli.console import wide_console
 from reconros_zenoh.cli.options import AsJson, ClockName, Out, Profile
 from reconros_zenoh.cli.progress import run_bar
 from reconros_zenoh.errors import UsageError
@@ -19,6 +19,8 @@ from reconros_zenoh.experiments.provenance import writing
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
+
+    from rich.console import Console
 
     from reconros_zenoh.experiments.roundtrip import Clock
 
@@ -74,7 +76,7 @@ def gateway(
     if as_json:
         print(json.dumps(result))
     else:
-        _print(Console(), result)
+        _print(wide_console(), result)
         print(f"drawings and gateway.json: {', '.join(map(str, paths))}")
     if result["interrupted"]:
         raise typer.Exit(130)
@@ -91,12 +93,13 @@ def _prepare(out: Path) -> None:
 
 def _write(out: Path, result: dict[str, Any]) -> list[Path]:
     from reconros_zenoh.measure.gateway_plots import transmission_figure
+    from reconros_zenoh.measure.plots import write_figure
 
     (out / _RESULT).write_text(json.dumps(result, indent=2) + "\n", encoding="utf-8")
     paths = []
     for publisher in dict.fromkeys(cell["publisher"] for cell in result["cells"]):
         paths.append(out / _FIGURES[publisher])
-        transmission_figure(result["cells"], publisher).savefig(paths[-1], dpi=120)
+        write_figure(transmission_figure(result["cells"], publisher), paths[-1])
     return paths
 
 

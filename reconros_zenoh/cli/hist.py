@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import json
+import os
 from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 
+from reconros_zenoh.cli.console import wide_console
 from reconros_zenoh.errors import UsageError
 from reconros_zenoh.measure.histogram import NamedRecord, describe, print_histogram
 from reconros_zenoh.measure.plots import write_histograms
@@ -55,7 +56,7 @@ def hist(
     if as_json:
         print(json.dumps({"records": [describe(entry, other, bins) for entry, other in pairs]}, indent=2))
         return
-    console = Console()
+    console = wide_console(60)
     for entry, other in pairs:
         print_histogram(console, entry, other, bins)
     if alone := [entry.name for entry, other in pairs if compare and not other]:
@@ -67,7 +68,7 @@ def hist(
 def _load(paths: list[Path]) -> list[NamedRecord]:
     files = [file for path in paths for file in (find_records(path) if path.is_dir() else [path])]
     # A second way to the same file is not a second record.
-    files = list({file.resolve(): file for file in reversed(files)}.values())[::-1]
+    files = list({os.path.realpath(file): file for file in reversed(files)}.values())[::-1]
     return [
         NamedRecord(name, file, read_record(file))
         for name, file in zip(short_names(files), files, strict=True)

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import importlib
 import logging
+import math
 import os
 import signal
 import sys
+import time
 
 import typer
 
 from reconros_zenoh.errors import ReconrosError, TransportError, UsageError
+
+_FINISHING_S = 5.0
 
 _VERBS = {
     "demo": ("demo", "demo"),
@@ -44,7 +48,10 @@ def main() -> None:
     end (`up`: by SIGTERM 143).
     """
     logging.basicConfig(level=logging.INFO, format="%(levelname)s %(name)s: %(message)s")
-    signal.signal(signal.SIGTERM, _end)
+    logging.getLogger("matplotlib").setLevel(logging.ERROR)  # where its fonts are is nobody's concern
+    ending = _Ending()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, ending)
     # A verb imports what it needs itself: the others' imports would double its start.
     given = sys.argv[1] if len(sys.argv) > 1 else ""
     application = _application([given] if given in _VERBS else list(_VERBS))
@@ -87,6 +94,18 @@ def _fail(error: ReconrosError, status: int) -> None:
     sys.exit(status)
 
 
-def _end(*_: object) -> None:
-    """End on SIGTERM as on Ctrl-C: through every `finally`."""
-    raise KeyboardInterrupt
+class _Ending:
+    """Ends on SIGTERM as on Ctrl-C: through every `finally`.
+
+    For some seconds further signals are ignored, so that what was measured can be written: a second Ctrl-C,
+    or the second signal of `timeout`, which sends one to the process and one to its group.
+    """
+
+    def __init__(self) -> None:
+        self._ignored_until_s = -math.inf
+
+    def __call__(self, *_: object) -> None:
+        now_s = time.monotonic()
+        if now_s >= self._ignored_until_s:
+            self._ignored_until_s = now_s + _FINISHING_S
+            raise KeyboardInterrupt

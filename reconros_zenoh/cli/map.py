@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 from rich.box import SIMPLE_HEAD
-from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
 from reconros_zenoh.board.profile import read_profile
+from reconros_zenoh.cli.console import wide_console
 from reconros_zenoh.cli.options import ENDPOINT, AsJson, Domain, Router, project_prints
 from reconros_zenoh.errors import UsageError
 from reconros_zenoh.mapping.communication import Crossings, map_topics
@@ -25,6 +25,8 @@ from reconros_zenoh.measure.statistics import format_share
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
+
+    from rich.console import Console
 
     from reconros_zenoh.mapping.graph import ComputationGraph, Edge
     from reconros_zenoh.project.build_cfg import BuildConfiguration
@@ -110,7 +112,7 @@ def map_communication(
         return
     for warning in result["warnings"]:
         print(f"warning: {warning}", file=sys.stderr)
-    _print(Console(), result, Crossings.of(graph, {name: each.mapping for name, each in rule.items()}))
+    _print(wide_console(), result, Crossings.of(graph, {name: each.mapping for name, each in rule.items()}))
     if plot:
         print(f"drawn to {plot}")
     if apply:

@@ -10,11 +10,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.console import Console
 
 from board_daemon.hosting import BoardOptions
 from reconros_zenoh.board.control import status
 from reconros_zenoh.board.profile import profile_names, read_profile
+from reconros_zenoh.cli.console import wide_console
 from reconros_zenoh.cli.options import (
     ENDPOINT,
     AsJson,
@@ -92,7 +92,7 @@ def run(
     if as_json:
         print(json.dumps(done))
     else:
-        print_status(Console(), done)
+        print_status(wide_console(), done)
 
 
 def _profile_of(configuration: BuildConfiguration) -> str:

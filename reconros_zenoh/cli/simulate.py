@@ -15,9 +15,11 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeElapsedCo
 from rich.table import Table
 from rich.text import Text
 
+from reconros_zenoh.cli.console import wide_console
 from reconros_zenoh.cli.options import AsJson, project_prints
 from reconros_zenoh.cli.service_commands import read_deployment
 from reconros_zenoh.experiments.deployment import DeploymentRun, prepare
+from reconros_zenoh.experiments.interruption import until_interrupted
 from reconros_zenoh.measure.statistics import format_ms
 
 if TYPE_CHECKING:
@@ -51,7 +53,7 @@ def simulate(
     """Run a deployment, the very file that `up` runs, in one process in virtual time.
 
     The same seed gives the same records, bit for bit. Exit status 0 only if every answer was right and
-    nothing was lost.
+    nothing was lost. Ctrl-C keeps what was measured.
     """
     plan = read_deployment(file, os.environ).changed(requests, seed)
     prepare(out)
@@ -67,14 +69,19 @@ def simulate(
     ):
         run = DeploymentRun([plan] if boards is None else [plan.clone(number) for number in range(boards)])
         task = progress.add_task("", total=run.requests)
-        run.run(lambda: progress.advance(task))
+        with until_interrupted() as interruption:
+            run.run(lambda: progress.advance(task))
     run.write_records(out)
     summaries = run.summaries()
+    simulated_s = run.simulated_ns / 1e9
     if as_json:
-        print(json.dumps({"file": str(file), "simulated_s": run.simulated_ns / 1e9, "boards": summaries}))
+        facts = {"file": str(file), "simulated_s": simulated_s, "boards": summaries}
+        print(json.dumps(facts | {"interrupted": interruption.happened}))
     else:
-        _print_table(Console(), summaries)
-        print(f"{run.simulated_ns / 1e9:.1f} s of virtual time; the records are in {out}")
+        _print_table(wide_console(), summaries)
+        print(f"{simulated_s:.1f} s of virtual time; the records are in {out}")
+    if interruption.happened:
+        raise typer.Exit(130)
     raise typer.Exit(0 if run.all_right() else 1)
 
 

@@ -8,16 +8,18 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.box import SIMPLE_HEAD
-from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from reconros_zenoh.cli.console import wide_console
 from reconros_zenoh.cli.options import AsJson, ClockName, Profile
 from reconros_zenoh.cli.progress import run_bar
 from reconros_zenoh.measure.statistics import format_error, format_ms, format_share
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
+
+    from rich.console import Console
 
 Clock = Annotated[ClockName, typer.Option(help="Real time on this host, or virtual time.")]
 
@@ -47,13 +49,10 @@ def callbacks(
         result = measure_callbacks(clock.value, model, repeat, advance) | digits
     if as_json:
         print(json.dumps(result))
-        return
-    console = Console()
-    _print_callbacks(console, result)
-    if clock is ClockName.WALL:
-        _print_host(console, result)
-    if digits:
-        console.print(f"MNIST: {digits['accuracy']:.2%} of {digits['digits']} digits classified as labelled")
+    else:
+        _show_callbacks(result)
+    if result["interrupted"]:
+        raise typer.Exit(130)
 
 
 def reconfiguration(
@@ -78,11 +77,13 @@ def reconfiguration(
         result = measure_reconfiguration(clock.value, model, writes, region or [], advance)
     if as_json:
         print(json.dumps(result))
-        return
-    console = Console()
-    _print_slots(console, result)
-    _print_regression(console, result)
-    _print_what_if(console, result)
+    else:
+        console = wide_console()
+        _print_slots(console, result)
+        _print_regression(console, result)
+        _print_what_if(console, result)
+    if result["interrupted"]:
+        raise typer.Exit(130)
 
 
 def _classified(path: Path) -> dict[str, float | int]:
@@ -91,6 +92,15 @@ def _classified(path: Path) -> dict[str, float | int]:
 
     images, labels = mnist.load_digits(path)
     return {"digits": len(labels), "accuracy": mnist.accuracy(images, labels)}
+
+
+def _show_callbacks(result: Mapping[str, Any]) -> None:
+    console = wide_console()
+    _print_callbacks(console, result)
+    if result["clock"] == "wall":
+        _print_host(console, result)
+    if "digits" in result:
+        console.print(f"MNIST: {result['accuracy']:.2%} of {result['digits']} digits classified as labelled")
 
 
 def _print_callbacks(console: Console, result: Mapping[str, Any]) -> None:
@@ -188,7 +198,7 @@ def _print_slots(console: Console, result: Mapping[str, Any]) -> None:
 def _print_regression(console: Console, result: Mapping[str, Any]) -> None:
     paper = result["paper"]
     ours = paper["regression_of_table"]
-    slots = [f"RS{slot}" for slot in result["slots"]]
+    slots = [f"RS{slot}" for slot, _ in enumerate(ours["residuals_ms"])]
     table = _table(
         "t_rc = S / B + t_offset, with the residuals [ms] of each slot",
         ("", "t_offset [ms]", "B [MB/s]", *slots),

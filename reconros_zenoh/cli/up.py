@@ -44,10 +44,8 @@ def up(
                 start_supervisor(file, folder, environment, screen.show)
             else:
                 supervise(deployment, folder, environment, screen.show)
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, SystemExit):  # the latter is SIGTERM or SIGHUP (`EndingSignals`)
         failure, error = typer.Exit(130), "interrupted"
-    except SystemExit as ending:  # SIGTERM or SIGHUP, see `EndingSignals`
-        failure, error = ending, "interrupted"
     except ExperimentError as caught:
         failure, error = caught, str(caught)
     if as_json:

@@ -15,6 +15,7 @@ from reconros_zenoh.board.osif import Osif
 from reconros_zenoh.clock.virtual import VirtualEnvironment
 from reconros_zenoh.clock.wall import WallEnvironment
 from reconros_zenoh.errors import ExperimentError, UsageError
+from reconros_zenoh.experiments.interruption import until_interrupted
 from reconros_zenoh.experiments.provenance import host
 from reconros_zenoh.experiments.roundtrip import application_folder
 from reconros_zenoh.project.loader import load_project
@@ -80,7 +81,8 @@ def measure_callbacks(
 ) -> dict[str, Any]:
     """Return Table I as the board model has it, each callback run `repeat` times in each place.
 
-    `on_run` is called after each of the ten runs. Raise UsageError for a profile that models nothing.
+    `on_run` is called after each of the ten runs; Ctrl-C keeps the callbacks that are complete. Raise
+    UsageError for a profile that models nothing.
     """
     model = profile.model
     if model is None:
@@ -91,13 +93,14 @@ def measure_callbacks(
     quiet = _without_losses(profile, model)
     table = {}
     overruns = 0
-    for name in TABLE_I:
-        runs: dict[Place, Isolated] = {}
-        for place in PLACES:
-            runs[place] = run_alone(clock, quiet, project, name, place, repeat)
-            overruns += runs[place].overruns
-            on_run()
-        table[name] = _row(name, runs["hardware"], runs["software"], model)
+    with until_interrupted() as interruption:
+        for name in TABLE_I:
+            runs: dict[Place, Isolated] = {}
+            for place in PLACES:
+                runs[place] = run_alone(clock, quiet, project, name, place, repeat)
+                overruns += runs[place].overruns
+                on_run()
+            table[name] = _row(name, runs["hardware"], runs["software"], model)
     return {
         "experiment": "callbacks",
         "clock": clock,
@@ -107,6 +110,7 @@ def measure_callbacks(
         "basis_memif": model.memif.bandwidth.basis,
         "basis_calls": model.osif.call.basis,
         "host": host(overruns),
+        "interrupted": interruption.happened,
     }
 
 

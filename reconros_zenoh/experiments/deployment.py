@@ -131,8 +131,10 @@ class DeploymentRun:
                     self._may_lose.add(service)
                 for camera in plan.cameras.values():
                     simulation.add_camera(camera)
-            simulation.run()
-            self.simulated_ns = simulation.environment.now
+            try:
+                simulation.run()
+            finally:
+                self.simulated_ns = simulation.environment.now
 
     def all_right(self) -> bool:
         """Tell whether every answer came and was right; pictures, sent with best effort, may be lost."""

@@ -23,6 +23,7 @@ VARIANTS = ("one_slot", "two_slots")
 RATE_HZ = 5.0
 """Pictures per second. The communication stack of the measured board is busy with one for some 80 ms."""
 
+REPORT = "report.html"
 FILES = ("filter.csv", "control.csv", "first.png", "last.png", "filtered.gif")
 _PERCENTILES = {"median": 50.0, "p95": 95.0}
 
@@ -57,6 +58,17 @@ class DesignPlan:
         return self.folder / variant
 
 
+@dataclass(frozen=True, slots=True)
+class Ending:
+    """What there was when a variant ended or was interrupted."""
+
+    status: Mapping[str, Any]
+    """What the board `vision` said of itself (`board.control.status`)."""
+
+    pictures: int | None
+    """How many pictures the camera had taken; None where nobody counted them."""
+
+
 def prepare(plan: DesignPlan) -> None:
     """Make the folders of the run, without what an earlier run left; raise UsageError if that fails."""
     try:
@@ -64,19 +76,27 @@ def prepare(plan: DesignPlan) -> None:
             plan.variant_folder(variant).mkdir(parents=True, exist_ok=True)
             for name in FILES:
                 (plan.variant_folder(variant) / name).unlink(missing_ok=True)
+        for name in ("experiment.json", REPORT):
+            (plan.folder / name).unlink(missing_ok=True)
     except OSError as error:
         raise UsageError(
             f"{plan.folder} cannot be written ({error.strerror}). Choose another folder with --out."
         ) from None
 
 
-def finish(plan: DesignPlan, statuses: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
+def finish(plan: DesignPlan, endings: Mapping[str, Ending], *, interrupted: bool) -> dict[str, Any]:
     """Return the experiment's object, made from the records, and write it as experiment.json.
 
-    `statuses` has what the board `vision` said of itself at the end of each variant (`board.control.status`).
+    It has the variants in `endings` of which anything was recorded; what the shared slot costs is None unless
+    both were.
     """
-    variants = {variant: _variant(plan, variant, status) for variant, status in statuses.items()}
-    one, two = (variants[variant] for variant in VARIANTS)
+    variants = {
+        name: variant
+        for name, ending in endings.items()
+        if (variant := _variant(plan, name, ending))["frames_out"]
+        or variant["control_out"]
+        or not interrupted
+    }
     experiment = {
         "experiment": "design",
         "clock": plan.clock,
@@ -85,9 +105,12 @@ def finish(plan: DesignPlan, statuses: Mapping[str, Mapping[str, Any]]) -> dict[
         "profile": plan.profile,
         "variants": variants,
         "shared_slot_costs_ms": {
-            chain: _difference(one[f"{chain}_ms"]["median"], two[f"{chain}_ms"]["median"])
+            chain: _difference(
+                [variants[name][f"{chain}_ms"]["median"] for name in VARIANTS if name in variants]
+            )
             for chain in ("filter", "control")
         },
+        "interrupted": interrupted,
         **provenance(),
         "machine": machine(),
     }
@@ -96,17 +119,18 @@ def finish(plan: DesignPlan, statuses: Mapping[str, Mapping[str, Any]]) -> dict[
 
 
 def all_right(experiment: Mapping[str, Any]) -> bool:
-    """Tell whether both chains gave something under each variant, and nothing wrong.
+    """Tell whether both chains gave something under each variant to its end, and nothing wrong.
 
     Pictures may be lost: they are sent with best effort.
     """
-    return all(
+    return not experiment["interrupted"] and all(
         variant["frames_out"] and variant["control_out"] and not variant["wrong"]
         for variant in experiment["variants"].values()
     )
 
 
-def _variant(plan: DesignPlan, variant: str, status: Mapping[str, Any]) -> dict[str, Any]:
+def _variant(plan: DesignPlan, variant: str, ending: Ending) -> dict[str, Any]:
+    status = ending.status
     summaries = {}
     for chain in ("filter", "control"):
         record = read_record(plan.variant_folder(variant) / f"{chain}.csv")
@@ -116,7 +140,7 @@ def _variant(plan: DesignPlan, variant: str, status: Mapping[str, Any]) -> dict[
         "reconfigurations": sum(slot["reconfigurations"] for slot in slots),
         "reconfiguration_ms": sum(slot["reconfiguration_ms"] for slot in slots),
         "slots": slots,
-        "frames_in": plan.pictures,
+        "frames_in": ending.pictures,
         "frames_out": summaries["filter"]["n"],
         "control_out": summaries["control"]["n"],
         "wrong": sum(int(summary["wrong"] or 0) for summary in summaries.values()),
@@ -130,5 +154,7 @@ def _variant(plan: DesignPlan, variant: str, status: Mapping[str, Any]) -> dict[
     }
 
 
-def _difference(one: float | None, two: float | None) -> float | None:
-    return None if one is None or two is None else one - two
+def _difference(medians_ms: list[float | None]) -> float | None:
+    """Return by how much the first is longer; None unless there are two."""
+    known = [median_ms for median_ms in medians_ms if median_ms is not None]
+    return known[0] - known[1] if len(known) == len(VARIANTS) else None

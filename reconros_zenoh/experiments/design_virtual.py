@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from contextlib import ExitStack
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from board_daemon.hosting import BoardOptions
 from host_clients.camera import CameraOptions
 from host_clients.gallery import Gallery
 from reconros_zenoh.board.control import status
 from reconros_zenoh.board.profile import read_profile
-from reconros_zenoh.experiments.design import RATE_HZ, VARIANTS, projects_folder
+from reconros_zenoh.experiments.design import RATE_HZ, VARIANTS, Ending, projects_folder
 from reconros_zenoh.experiments.simulation import Simulation
 from reconros_zenoh.measure.record import RecordWriter
 from reconros_zenoh.project.loader import load_project
@@ -21,19 +21,17 @@ if TYPE_CHECKING:
     from reconros_zenoh.experiments.design import DesignPlan
 
 
-def run_design_virtual(plan: DesignPlan, on_variant: Callable[[], None]) -> dict[str, dict[str, Any]]:
-    """Record each variant and return the status of the board `vision` at its end.
+def run_design_virtual(plan: DesignPlan, endings: dict[str, Ending], on_variant: Callable[[], None]) -> None:
+    """Record each variant and add its end to `endings`, that of an interrupted one too.
 
     `on_variant()` is called after each of them.
     """
-    statuses = {}
     for variant in VARIANTS:
-        statuses[variant] = _run_variant(plan, variant)
+        _run_variant(plan, variant, endings)
         on_variant()
-    return statuses
 
 
-def _run_variant(plan: DesignPlan, variant: str) -> dict[str, Any]:
+def _run_variant(plan: DesignPlan, variant: str, endings: dict[str, Ending]) -> None:
     profile = read_profile(plan.profile)
     vision, control = (load_project(projects_folder() / name) for name in ("vision", "control"))
     folder = plan.variant_folder(variant)
@@ -49,7 +47,9 @@ def _run_variant(plan: DesignPlan, variant: str) -> dict[str, Any]:
             records.enter_context(RecordWriter(folder / f"{name}.csv")) for name in ("filter", "control")
         )
         simulation.add_viewer(0, pictures.write, indices.write, gallery.add)
-        simulation.add_camera(CameraOptions("", plan.pictures, RATE_HZ))
-        simulation.run()
-        gallery.write(folder, RATE_HZ)
-        return status(hosted.board, hosted.executor)
+        camera = simulation.add_camera(CameraOptions("", plan.pictures, RATE_HZ))
+        try:
+            simulation.run()
+        finally:
+            gallery.write(folder, RATE_HZ)
+            endings[variant] = Ending(status(hosted.board, hosted.executor), camera.sent)

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 from deploy.compose import read_compose
 from deploy.runner import LocalRunner
+from deploy.service_run import ServiceState
 from reconros_zenoh.board.control import ask_status
-from reconros_zenoh.experiments.design import RATE_HZ, VARIANTS, projects_folder
+from reconros_zenoh.experiments.design import RATE_HZ, VARIANTS, Ending, projects_folder
 from reconros_zenoh.experiments.wall import free_port
 from reconros_zenoh.transport.zenoh import ZenohTransport
 
@@ -21,14 +22,13 @@ if TYPE_CHECKING:
 
 
 def run_design_wall(
-    plan: DesignPlan, on_variant: Callable[[], None], view: int | None
-) -> dict[str, dict[str, Any]]:
-    """Record each variant and return the status of the board `vision` at its end.
+    plan: DesignPlan, endings: dict[str, Ending], on_variant: Callable[[], None], view: int | None
+) -> None:
+    """Record each variant and add its end to `endings`, that of one interrupted while the camera ran too.
 
     `on_variant()` is called after each of them; `view` is the port of the viewer's page. Raise
     ExperimentError, naming the process and with the end of its log, when one fails; nothing is left running.
     """
-    statuses = {}
     with as_file(files("deploy") / "design_example.yaml") as compose:
         for variant in VARIANTS:
             router = f"tcp/127.0.0.1:{free_port()}"
@@ -50,8 +50,16 @@ def run_design_wall(
             deployment = read_compose(compose, environment)
             # The viewer writes its pictures when it is stopped, at the end of the context.
             with LocalRunner(deployment, folder / "logs", environment) as runner:
-                runner.run_until({"camera"})
-                with ZenohTransport.open(router) as transport:
-                    statuses[variant] = ask_status(transport, "vision")
+                try:
+                    runner.run_until({"camera"})
+                    endings[variant] = Ending(_status(router), plan.pictures)
+                except (KeyboardInterrupt, SystemExit):
+                    if runner.states["camera"] is ServiceState.STARTED:
+                        endings[variant] = Ending(_status(router), None)
+                    raise
             on_variant()
-    return statuses
+
+
+def _status(router: str) -> dict[str, Any]:
+    with ZenohTransport.open(router) as transport:
+        return ask_status(transport, "vision")

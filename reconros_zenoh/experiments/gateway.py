@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import statistics
-from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from importlib.resources import as_file, files
 from itertools import product
@@ -16,13 +15,14 @@ from reconros_zenoh.board.spans import Timeline
 from reconros_zenoh.clock.virtual import VirtualEnvironment, succeed_once
 from reconros_zenoh.clock.wall import WallEnvironment
 from reconros_zenoh.errors import ExperimentError, UsageError
+from reconros_zenoh.experiments.interruption import until_interrupted
 from reconros_zenoh.experiments.provenance import host
 from reconros_zenoh.project.loader import load_project
 from reconros_zenoh.project.mapping_file import CallbackMapping, Mapping
 from reconros_zenoh.transport.simulated import SimulatedNetwork
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Sequence
+    from collections.abc import Callable, Iterable, Sequence
 
     import numpy as np
     from numpy.typing import NDArray
@@ -132,23 +132,6 @@ def measure_gateway(
         "host": host(overruns),
         "interrupted": interruption.happened,
     }
-
-
-@dataclass(slots=True)
-class Interruption:
-    """Whether Ctrl-C or SIGTERM has ended a block."""
-
-    happened: bool = False
-
-
-@contextmanager
-def until_interrupted() -> Iterator[Interruption]:
-    """Run the block to its end or to Ctrl-C or SIGTERM, so that what was measured is kept."""
-    interruption = Interruption()
-    try:
-        yield interruption
-    except KeyboardInterrupt:
-        interruption.happened = True
 
 
 def anchors(cells: Iterable[Cell]) -> list[dict[str, Any]]:

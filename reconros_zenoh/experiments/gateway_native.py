@@ -17,8 +17,9 @@ from itertools import product
 from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar, get_args
 
 from reconros_zenoh.errors import ExperimentError
-from reconros_zenoh.experiments.gateway import Cell, Times, Variant, until_interrupted
+from reconros_zenoh.experiments.gateway import Cell, Times, Variant
 from reconros_zenoh.experiments.gateway_processes import run_board, run_listener, run_publisher
+from reconros_zenoh.experiments.interruption import until_interrupted
 from reconros_zenoh.experiments.provenance import host
 from reconros_zenoh.experiments.wall import free_port
 from reconros_zenoh.transport.zenoh import ZenohRouter

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import closing
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,6 +16,7 @@ from reconros_zenoh.clock.activity import Activity
 from reconros_zenoh.clock.virtual import VirtualEnvironment
 from reconros_zenoh.clock.wall import WallEnvironment
 from reconros_zenoh.errors import FileError, UsageError
+from reconros_zenoh.experiments.interruption import until_interrupted
 from reconros_zenoh.experiments.roundtrip import application_folder
 from reconros_zenoh.project.ini import Option
 from reconros_zenoh.project.loader import load_project
@@ -91,8 +93,8 @@ def measure_reconfiguration(
 ) -> dict[str, Any]:
     """Return Table II with `writes` timed writes per slot, and estimates for other `regions`.
 
-    `on_slot` is called after each slot. Raise UsageError for a profile that models nothing and for a text
-    that is not the regions of a slot.
+    `on_slot` is called after each slot; Ctrl-C keeps those that are complete. Raise UsageError for a profile
+    that models nothing and for a text that is not the regions of a slot.
     """
     model = profile.model
     if model is None:
@@ -103,7 +105,7 @@ def measure_reconfiguration(
     network = SimulatedNetwork(environment)
     board = Board(environment, Context(network.transport("b0")), profile, project.slots)
     slots = {}
-    try:
+    with until_interrupted() as interruption, closing(board):
         for declared in project.configuration.slots:
             slot = board.slots[declared.id]
             written = environment.event()
@@ -113,8 +115,6 @@ def measure_reconfiguration(
                 slot, slot_resources(declared.regions), np.array(times_ms, dtype=np.float64), model
             )
             on_slot()
-    finally:
-        board.close()
     return {
         "experiment": "reconfiguration",
         "clock": clock,
@@ -136,6 +136,7 @@ def measure_reconfiguration(
         "what_if": WHAT_IF,
         "bitstream_fit": _fit_quality(model),
         "regions": estimates,
+        "interrupted": interruption.happened,
     }
 
 

@@ -46,6 +46,11 @@ class Plan:
         """Where this clock's records and experiment.json go."""
         return self.out / self.clock
 
+    @property
+    def drawing(self) -> Path:
+        """Where the drawing of all its records goes."""
+        return self.folder / "roundtrips.png"
+
     def record_path(self, mapping: str, client: str) -> Path:
         """Where the round trips of one client go."""
         return self.folder / mapping / f"{client}.csv"
@@ -108,7 +113,8 @@ def prepare(plan: Plan) -> None:
             (plan.folder / mapping).mkdir(parents=True, exist_ok=True)
             for client in CLIENTS:
                 plan.record_path(mapping, client).unlink(missing_ok=True)
-        (plan.folder / "experiment.json").unlink(missing_ok=True)
+        for path in (plan.folder / "experiment.json", plan.drawing):
+            path.unlink(missing_ok=True)
 
 
 def _records(plan: Plan) -> dict[str, dict[str, Record]]:

@@ -39,6 +39,8 @@ def write_design_report(
     """
     variants = experiment["variants"]
     parts = [_introduction(experiment), "<h2>In short</h2>", _summary(experiment)]
+    if experiment["interrupted"]:
+        parts.append('<p class="warning">The run was interrupted: its last variant ended early.</p>')
     for name, variant in variants.items():
         if troubles := host_troubles(variant["host"]):
             text = f"{_NAMES[name]}: {' '.join(troubles)}"
@@ -84,6 +86,8 @@ def _introduction(experiment: Mapping[str, Any]) -> str:
 
 
 def _summary(experiment: Mapping[str, Any]) -> str:
+    if experiment["variants"].keys() != _NAMES.keys():
+        return "<p>Only one variant was run, so there is nothing to compare it with.</p>"
     one, two = (experiment["variants"][name] for name in _NAMES)
     costs = experiment["shared_slot_costs_ms"]
     slots = (
@@ -96,12 +100,17 @@ def _summary(experiment: Mapping[str, Any]) -> str:
         f"servo index {_longer(costs['control'])} (median, from its command to its publication)."
     )
     losses = (
-        f"Of {one['frames_in']} pictures {one['frames_out']} came back with one slot, {two['frames_out']} "
-        "with two. They are sent with best effort: a picture that loses a fragment on the network, or is "
-        "overtaken by a newer one before it is filtered, is gone."
+        f"With one slot {_share(one)} pictures came back, with two {_share(two)}. They are sent with best "
+        "effort: a picture that loses a fragment on the network, or is overtaken by a newer one before it is "
+        "filtered, is gone."
     )
     sentences = (slots, times, losses)
     return "<ul>" + "".join(f"<li>{escape(sentence)}</li>" for sentence in sentences) + "</ul>"
+
+
+def _share(variant: Mapping[str, Any]) -> str:
+    taken = variant["frames_in"]
+    return f"{variant['frames_out']}" if taken is None else f"{variant['frames_out']} of {taken}"
 
 
 def _longer(cost_ms: float | None) -> str:
@@ -113,7 +122,9 @@ def _longer(cost_ms: float | None) -> str:
 def _table(variants: Mapping[str, Mapping[str, Any]]) -> str:
     rows = []
     for name, variant in variants.items():
-        counts = [format_ms(variant[key]) if key.endswith("_ms") else str(variant[key]) for key in _FIGURES]
+        counts = [
+            format_ms(variant[key]) if key.endswith("_ms") else _count(variant[key]) for key in _FIGURES
+        ]
         times = [
             format_ms(variant[chain][point])
             for chain in ("filter_ms", "control_ms")
@@ -126,6 +137,10 @@ def _table(variants: Mapping[str, Mapping[str, Any]]) -> str:
         + '<p class="small">Times of pictures are from the camera to the viewer, those of servo indices from '
         "their command to their publication, in ms.</p>"
     )
+
+
+def _count(value: int | None) -> str:
+    return "-" if value is None else str(value)
 
 
 def _slots(variants: Mapping[str, Mapping[str, Any]]) -> str:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from itertools import cycle
+from typing import TYPE_CHECKING, Any, Literal, get_args
+
+from reconros_zenoh.measure.plots import GREY, INK, drawing_style
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -10,9 +13,13 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_COLOURS = {"smt": "#2f7ec4", "gateway": "#d2691e"}
-_LINES = ("-", "--", ":", "-.")
-_SIDES = (("hardware", "hw", "hw_max_ms"), ("software", "sw", "sw_ms"))
+_VARIANTS = {"smt": ("SMT", "#2f7ec4"), "gateway": ("with a gateway", "#d2691e")}
+_Line = Literal["-", "--", ":", "-."]
+_LINES: tuple[_Line, ...] = get_args(_Line)
+_SIDES = (
+    ("hardware, slowest subscriber", "hw", "hw_max_ms"),
+    ("software", "sw", "sw_ms"),
+)
 
 
 def transmission_figure(cells: Sequence[dict[str, Any]], publisher: str) -> Figure:
@@ -23,37 +30,59 @@ def transmission_figure(cells: Sequence[dict[str, Any]], publisher: str) -> Figu
     """
     from matplotlib.figure import Figure  # noqa: PLC0415  takes a second, as in plots.py
 
-    figure = Figure(figsize=(10, 7), layout="constrained")
-    axes = figure.subplots(2, 2, sharex=True)
     chosen = [cell for cell in cells if cell["publisher"] == publisher]
-    for column, (place, side, time) in enumerate(_SIDES):
-        _draw(axes[0][column], axes[1][column], chosen, side, time)
-        axes[0][column].set_title(f"{publisher} to {place}")
-    axes[0][0].set_ylabel("transmission time [ms]")
-    axes[1][0].set_ylabel("speedup by the gateway")
-    axes[0][0].legend(fontsize="small")
+    with drawing_style():
+        figure = Figure(figsize=(9, 6), layout="constrained")
+        axes = figure.subplots(2, 2, sharex=True)
+        for column, (place, side, time) in enumerate(_SIDES):
+            _draw(axes[0][column], axes[1][column], chosen, side, time)
+            axes[0][column].set_title(f"{publisher} to {place}", loc="left", fontweight="bold")
+        axes[0][0].set_ylabel("transmission time [ms]")
+        axes[1][0].set_ylabel("speedup by the gateway")
+        figure.supxlabel("message size")
+        _legend(figure, sorted({cell["subscribers"] for cell in chosen}))
     return figure
 
 
 def _draw(times: Axes, speedups: Axes, cells: Sequence[dict[str, Any]], side: str, time: str) -> None:
-    counts = sorted({cell["subscribers"] for cell in cells})
-    for number, count in enumerate(counts):
+    from matplotlib.ticker import LogLocator, NullLocator  # noqa: PLC0415
+
+    for number, count in enumerate(sorted({cell["subscribers"] for cell in cells})):
         row = sorted((cell for cell in cells if cell["subscribers"] == count), key=lambda cell: cell["size"])
-        sizes = [cell["size"] / 1000 for cell in row]
+        sizes = [cell["size"] for cell in row]
         style = _LINES[number % len(_LINES)]
-        for variant, colour in _COLOURS.items():
-            times.plot(
-                sizes,
-                [cell[variant][time] for cell in row],
-                style,
-                color=colour,
-                marker="o",
-                label=f"{variant}, {count} in hardware",
-            )
-        speedups.plot(sizes, [cell[f"speedup_{side}"] for cell in row], style, color="#24292f", marker="o")
+        for variant, (_, colour) in _VARIANTS.items():
+            values_ms = [cell[variant][time] for cell in row]
+            times.plot(sizes, values_ms, style, color=colour, marker="o", markersize=4)
+        values = [cell[f"speedup_{side}"] for cell in row]
+        speedups.plot(sizes, values, style, color=INK, marker="o", markersize=4)
     times.set_xscale("log")
     times.set_yscale("log")
-    speedups.axhline(1, color="#8b949e", linewidth=0.8)
-    speedups.set_xlabel("message [kB]")
+    times.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+    times.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
+    times.yaxis.set_minor_locator(NullLocator())
+    speedups.axhline(1, color=GREY, linewidth=0.8)
+    every = sorted({cell["size"] for cell in cells})
     for axes in (times, speedups):
+        axes.set_xticks(every, [_size(size) for size in every])
+        axes.xaxis.set_minor_locator(NullLocator())
         axes.grid(visible=True, alpha=0.3)
+
+
+def _legend(figure: Figure, counts: Sequence[int]) -> None:
+    from matplotlib.lines import Line2D  # noqa: PLC0415
+
+    handles = [Line2D([], [], color=colour, label=name) for name, colour in _VARIANTS.values()]
+    handles += [
+        Line2D([], [], color=INK, linestyle=style, label=f"hardware subscribers: {count}")
+        for style, count in zip(cycle(_LINES), counts, strict=False)
+    ]
+    figure.legend(handles=handles, loc="outside upper right", ncols=len(handles))
+
+
+def _size(count: int) -> str:
+    """Return the number of bytes as `--sizes` takes it."""
+    for unit, name in ((10**6, "MB"), (1000, "kB")):
+        if count >= unit:
+            return f"{count / unit:g} {name}"
+    return f"{count} B"

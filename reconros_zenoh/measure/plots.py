@@ -8,9 +8,10 @@ from __future__ import annotations
 import io
 import re
 import textwrap
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from PIL import Image
 
 from reconros_zenoh.errors import UsageError
 from reconros_zenoh.measure.histogram import bin_edges, count
@@ -59,40 +60,32 @@ def grid_figure(records: Mapping[str, Mapping[str, Record]]) -> Figure:
     axis is common to a client, so the mappings can be compared (after ReconROS Executor, Fig. 6).
     """
     from matplotlib.figure import Figure  # noqa: PLC0415  see the module docstring
-    from matplotlib.layout_engine import ConstrainedLayoutEngine  # noqa: PLC0415
 
-    layout = ConstrainedLayoutEngine(hspace=0.08)
     clients = list(dict.fromkeys(client for row in records.values() for client in row))
-    with _style():
-        figure = Figure(figsize=(2.65 * len(clients) + 0.5, 2.0 * len(records) + 0.8), layout=layout)
+    colours = [_MAPPING_COLOURS[row % len(_MAPPING_COLOURS)] for row in range(len(records))]
+    with drawing_style():
+        figure = Figure(figsize=(1.85 * len(clients) + 0.75, 1.7 * len(records) + 0.7), layout="constrained")
         grid = figure.subplots(len(records), len(clients), squeeze=False)
         for column, client in enumerate(clients):
             edges_ms = _grid_edges(records, client)
             for row, (mapping, of_mapping) in enumerate(records.items()):
                 axes = grid[row][column]
-                colour = _MAPPING_COLOURS[row % len(_MAPPING_COLOURS)]
                 reference = reference_cells().get(mapping, {}).get(client)
                 record = of_mapping.get(client)
-                _panel(axes, edges_ms, record, reference.density(edges_ms) if reference else None, colour)
-                # The empty line makes room for the name of the mapping.
-                axes.set_title(f"\n{client}", loc="left", fontweight="bold")
+                behind = reference.density(edges_ms) if reference else None
+                _panel(axes, edges_ms, record, behind, colours[row])
+                # The empty line makes room for the medians.
+                axes.set_title(f"{client}\n", loc="left", fontweight="bold")
                 board_ms = reference.median_ms if reference else None
                 axes.set_title(_medians(record, "board", board_ms), loc="right", fontsize=8)
         for row, mapping in enumerate(records):
-            grid[row][0].annotate(
-                mapping,
-                (0, 1),
-                xytext=(0, 24),
-                xycoords="axes fraction",
-                textcoords="offset points",
-                fontsize=12,
-                fontweight="bold",
-                color=_MAPPING_COLOURS[row % len(_MAPPING_COLOURS)],
-            ).set_in_layout(False)
+            grid[row][0].set_ylabel(
+                _wrap(mapping, 18), fontsize=12, fontweight="bold", color=colours[row], labelpad=10
+            )
         figure.supxlabel("round-trip time [ms]; above each panel its median")
         figure.supylabel("relative frequency")
         known = any(client in reference_cells().get(mapping, {}) for mapping in records for client in clients)
-        _legend(figure, "this run", "real board" if known else None)
+        _legend(figure, "this run", "real board" if known else None, colours)
     return figure
 
 
@@ -106,7 +99,7 @@ def spans_figure(spans: Mapping[str, Mapping[str, Mapping[str, float]]]) -> Figu
     clients = list(dict.fromkeys(client for row in spans.values() for client in row))
     colours = _stage_colours(stage for row in spans.values() for cell in row.values() for stage in cell)
     places = range(len(spans))
-    with _style():
+    with drawing_style():
         figure = Figure(figsize=(2.7 * len(clients) + 1.5, 0.45 * len(spans) + 1.3), layout="constrained")
         grid = figure.subplots(1, len(clients), squeeze=False, sharey=True)[0]
         for axes, client in zip(grid, clients, strict=True):
@@ -130,6 +123,16 @@ def spans_figure(spans: Mapping[str, Mapping[str, Mapping[str, float]]]) -> Figu
     return figure
 
 
+def write_grid(path: Path, records: Mapping[str, Mapping[str, Record]]) -> None:
+    """Write the grid of `grid_figure` to a `.png` or `.svg` file.
+
+    Raises UsageError for another suffix, if the file cannot be written, or if there is no record.
+    """
+    if not any(records.values()):
+        raise UsageError(f"{path}: there is no record to draw. Run the experiment first.")
+    write_figure(grid_figure(records), path, ("png", "svg"))
+
+
 def write_histograms(path: Path, pairs: Sequence[tuple[NamedRecord, NamedRecord | None]], bins: int) -> None:
     """Write a `.png` file with one histogram per record, the distribution to compare with behind it in grey.
 
@@ -141,7 +144,7 @@ def write_histograms(path: Path, pairs: Sequence[tuple[NamedRecord, NamedRecord 
 
     columns = min(len(pairs), 3)
     rows = -(-len(pairs) // columns)
-    with _style():
+    with drawing_style():
         figure = Figure(figsize=(4.2 * columns + 0.5, 2.4 * rows + 0.8), layout="constrained")
         grid = figure.subplots(rows, columns, squeeze=False).flatten()
         for axes, (entry, other) in zip(grid, pairs, strict=False):
@@ -156,20 +159,14 @@ def write_histograms(path: Path, pairs: Sequence[tuple[NamedRecord, NamedRecord 
             axes.set_axis_off()
         figure.supxlabel("round-trip time [ms]; above each panel its median")
         figure.supylabel("relative frequency")
-        _legend(figure, "record", "compared with" if any(other for _, other in pairs) else None)
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with _style():
-            figure.savefig(path, dpi=130)
-    except OSError as error:
-        raise UsageError(
-            f"{path}: the drawing cannot be written: {error.strerror}. Choose a folder that you may write to."
-        ) from error
+        behind_any = "compared with" if any(other for _, other in pairs) else None
+        _legend(figure, "record", behind_any, _MAPPING_COLOURS[1:2])
+    write_figure(figure, path)
 
 
 def draw_histogram(axes: Axes, record: Record, edges_ms: npt.NDArray[np.float64], title: str) -> None:
     """Draw the record's histogram with its mean, and its median above it."""
-    with _style():
+    with drawing_style():
         _panel(axes, edges_ms, record, None, _MAPPING_COLOURS[1])
         axes.set_title(f"{_wrap(title, 42)}\n", loc="left", fontweight="bold")
         axes.set_title(_medians(record, "other", None), loc="right", fontsize=8)
@@ -182,7 +179,7 @@ def inline_svg(figure: Figure) -> str:
     dark scheme.
     """
     buffer = io.StringIO()
-    with _style():
+    with drawing_style():
         figure.savefig(buffer, format="svg", transparent=True, metadata={"Date": None})
     svg = buffer.getvalue()
     svg = svg[svg.index("<svg") :]
@@ -192,7 +189,36 @@ def inline_svg(figure: Figure) -> str:
     return svg.replace(INK, "var(--ink)").replace(GREY, "var(--grey)")
 
 
-def _style() -> AbstractContextManager[None]:
+def write_figure(figure: Figure, path: Path, formats: Sequence[str] = ("png",)) -> None:
+    """Write the figure in the format that the file's suffix names, one of these.
+
+    Raises UsageError for another suffix or if the file cannot be written.
+    """
+    suffix = path.suffix.lower().removeprefix(".")
+    if suffix not in formats:
+        raise UsageError(
+            f"{path}: drawings are written as {' or '.join(formats)}. Name the file *.{formats[0]}."
+        )
+    buffer = io.BytesIO()
+    with drawing_style():
+        figure.savefig(buffer, format=suffix, dpi=160)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        if suffix == "png":
+            # Few colours: a third of the size, and nothing of it to be seen.
+            Image.open(buffer).convert("RGB").quantize(128, dither=Image.Dither.NONE).save(
+                path, optimize=True
+            )
+        else:
+            path.write_bytes(buffer.getvalue())
+    except OSError as error:
+        raise UsageError(
+            f"{path}: the drawing cannot be written: {error.strerror}. Choose a folder that you may write to."
+        ) from error
+
+
+def drawing_style() -> AbstractContextManager[None]:
+    """Return a context in which figures look alike; they are drawn in it and written in it."""
     import matplotlib as mpl  # noqa: PLC0415  see the module docstring
 
     return mpl.rc_context(
@@ -231,7 +257,7 @@ def _panel(
     notes = []
     if edges_ms.size:
         if edges_ms[-1] - edges_ms[-2] > 1.01 * (edges_ms[1] - edges_ms[0]):
-            notes.append("logarithmic axis")
+            notes.append("log axis")
             axes.set_xscale("log")
             axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
             axes.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
@@ -294,17 +320,24 @@ def _wrap(name: str, width: int) -> str:
     return textwrap.fill(name.replace("_", "_ "), width).replace("_ ", "_")
 
 
-def _legend(figure: Figure, ours: str, behind: str | None) -> None:
-    from matplotlib.lines import Line2D  # noqa: PLC0415  see the module docstring
+def _legend(figure: Figure, ours: str, behind: str | None, colours: Sequence[str]) -> None:
+    from matplotlib.legend_handler import HandlerTuple  # noqa: PLC0415  see the module docstring
+    from matplotlib.lines import Line2D  # noqa: PLC0415
     from matplotlib.patches import Patch  # noqa: PLC0415
 
-    handles: list[Patch | Line2D] = [
-        Patch(color=_MAPPING_COLOURS[1], alpha=0.6, label=ours),
-        Line2D([], [], color=INK, linestyle="--", linewidth=0.9, label="its mean"),
-    ]
+    handles: dict[str, Any] = {  # by label; matplotlib knows of tuples, its types do not
+        ours: tuple(Patch(color=colour, alpha=0.6) for colour in colours),
+        "its mean": Line2D([], [], color=INK, linestyle="--", linewidth=0.9),
+    }
     if behind:
-        handles.append(Patch(color=GREY, alpha=0.45, label=behind))
-    figure.legend(handles=handles, loc="outside upper right", ncols=len(handles))
+        handles[behind] = Patch(color=GREY, alpha=0.45)
+    figure.legend(
+        handles.values(),
+        handles,
+        handler_map={tuple: HandlerTuple(ndivide=None, pad=0)},
+        loc="outside upper right",
+        ncols=len(handles),
+    )
 
 
 def _stage_colours(stages: Iterable[str]) -> dict[str, str]:

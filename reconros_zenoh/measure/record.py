@@ -10,12 +10,16 @@ import numpy as np
 import numpy.typing as npt
 
 from reconros_zenoh.errors import ExperimentError, FileError, UsageError
+from reconros_zenoh.text_file import read_text_file
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
 Outcome = Literal["ok", "wrong", "lost"]
+
+_LIMIT_BYTES = 100_000_000
+"""Some millions of round trips."""
 
 HEADER = "index,round_trip_ms,outcome"
 
@@ -121,17 +125,7 @@ def read_record(path: Path) -> Record:
     values of such a file are kept, warm-up and totals too. Raises FileError, with the line, for anything
     else.
     """
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except OSError as error:
-        raise FileError(
-            path, None, f"cannot be read: {error.strerror}.", "Give a file of round-trip times."
-        ) from error
-    except UnicodeDecodeError as error:
-        raise FileError(
-            path, None, "is not a text file.", "Give a file of round-trip times in ms."
-        ) from error
-    lines = text.split("\n")
+    lines = read_text_file(path, "Give a file of round-trip times in ms.", _LIMIT_BYTES).split("\n")
     if lines[0].strip() == HEADER:
         return _read_round_trips(path, lines)
     return Record(path.stem, _read_values(path, lines))
@@ -153,7 +147,7 @@ def find_records(folder: Path) -> list[Path]:
 
 def short_names(paths: Sequence[Path]) -> list[str]:
     """Return `mapping/client` for each record file, with as many folders before it as tell them apart."""
-    parts = [path.resolve().with_suffix("").parts for path in paths]
+    parts = [path.absolute().with_suffix("").parts for path in paths]
     for depth in range(2, max(map(len, parts)) + 1):
         names = ["/".join(part[-depth:]) for part in parts]
         if len(set(names)) == len(names):

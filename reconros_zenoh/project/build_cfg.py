@@ -11,6 +11,7 @@ import re
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+from reconros_zenoh.errors import FileError
 from reconros_zenoh.project.clocks import read_clock, read_clock_name
 from reconros_zenoh.project.ini import Section, read_sections, unique_names
 from reconros_zenoh.project.resource_groups import read_resource_groups
@@ -56,6 +57,7 @@ _KNOWN_OPTIONS = {
     ),
     "ROSGateway": frozenset({"Slot", "HWTopic", "SWTopic", "MsgType"}),
 }
+_KINDS = {*_KNOWN_OPTIONS, "ResourceGroup"}
 
 
 @dataclass(frozen=True)
@@ -130,6 +132,13 @@ def read_build_cfg(path: Path) -> BuildConfiguration:
     """Return what the project file says, checked; `FileError` names the line of the first mistake."""
     warnings: list[str] = []
     sections = read_sections(path, warnings)
+    if not any(section.kind in _KINDS for section in sections):
+        raise FileError(
+            path,
+            1,
+            "this is no ReconROS project file: it has no section such as [General] or [ReconosThread@name].",
+            "Give a project's build.cfg; `reconros new NAME` makes a project.",
+        )
     warnings += _unknown(sections)
 
     def of_kind(kind: str) -> list[Section]:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from reconros_zenoh.errors import FileError
 from reconros_zenoh.project.numbered_names import NumberedName, parse_numbered_names
-from reconros_zenoh.project.text_file import read_old_text_file
+from reconros_zenoh.text_file import read_old_text_file
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from reconros_zenoh.errors import FileError, UsageError
-from reconros_zenoh.project.text_file import read_text_file
 from reconros_zenoh.ros.types import TypeRegistry
+from reconros_zenoh.text_file import read_text_file
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -16,7 +16,7 @@ from reconros_zenoh.project.interfaces import read_interfaces
 from reconros_zenoh.project.main_file import load_main, running_project
 from reconros_zenoh.project.mapping_file import Mapping, bitstream_slots, read_mapping
 from reconros_zenoh.project.resources import slot_resources
-from reconros_zenoh.project.text_file import read_text_file
+from reconros_zenoh.text_file import read_text_file
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -148,6 +148,8 @@ class Project:
 
 def load_project(folder: Path) -> Project:
     """Return the project in a folder; raise FileError for what is missing or wrong in it."""
+    if folder.is_file():
+        raise FileError(folder, None, "is a file.", "Give the folder of a project, where its build.cfg is.")
     configuration = read_build_cfg(folder / "build.cfg")
     check_topics(configuration)
     interfaces = read_interfaces(folder)

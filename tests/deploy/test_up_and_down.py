@@ -130,12 +130,13 @@ def test_up_prints_only_json_when_told_to(services: Services, run: Run) -> None:
     assert (services.folder / result["logs"] / "server.log").read_text() == "open\n"
 
 
-def test_ctrl_c_stops_all(services: Services, start: Start) -> None:
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=lambda number: number.name)
+def test_ctrl_c_stops_all(services: Services, start: Start, number: signal.Signals) -> None:
     _server_and(services, "block()")
     with start("up") as process:
         assert process.stdout is not None
         assert any(line == "client: started\n" for line in process.stdout)
-        process.send_signal(signal.SIGINT)
+        process.send_signal(number)
         output, errors = process.communicate()
         assert (process.returncode, errors) == (130, "")
     states = [line for line in output.splitlines() if line.endswith(": stopped")]
@@ -174,7 +175,7 @@ def test_down_stops_a_foreground_up_too(services: Services, start: Start, run: R
         assert any(line == "client: started\n" for line in process.stdout)
         assert run("down").stdout.splitlines() == ["server: stopped", "client: stopped"]
         process.communicate()
-        assert process.returncode == 128 + signal.SIGTERM
+        assert process.returncode == 130
     services.assert_gone()
 
 

@@ -1,4 +1,4 @@
-"""Every snippet of docs/ runs and prints what the page says; every command of README.md is there.
+"""Every snippet of docs/ runs and prints what the page says.
 
 A block of docs/ is marked behind its opening fence. ```python runs, all of a page in one namespace. With the
 name of a file behind the language (```ini robot/build.cfg) a block is written there first. ```console holds
@@ -13,50 +13,19 @@ import re
 import shlex
 import signal
 from contextlib import ExitStack
-from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import pytest
+from pages import README, ROOT, blocks, invoke
 from processes import Process, run
-from typer.testing import CliRunner
 
-from reconros_zenoh.cli.main import _VERBS, _application
 from reconros_zenoh.experiments.wall import free_port
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+    from pathlib import Path
 
-ROOT = Path(__file__).parents[2]
 PAGES = sorted((ROOT / "docs").glob("*.md"))
-BLOCK = re.compile(r"^```(?P<language>\w*)(?P<rest>[^\n]*)\n(?P<text>.*?)^```$", re.DOTALL | re.MULTILINE)
-APPLICATION = _application(list(_VERBS))
-
-
-class Block(NamedTuple):
-    """A fenced block: what stands behind the fence, and in which line of the page its text begins."""
-
-    language: str
-    rest: str
-    text: str
-    line: int
-
-
-def blocks(path: Path) -> Iterator[Block]:
-    text = path.read_text(encoding="utf-8")
-    for match in BLOCK.finditer(text):
-        line = text.count("\n", 0, match.start("text")) + 1
-        yield Block(match["language"], match["rest"].strip(), match["text"], line)
-
-
-def invoke(command: str, *more: str) -> list[str]:
-    """Return the lines that the command prints; raise what it raises."""
-    program, *arguments = shlex.split(command, comments=True)
-    assert program == "reconros", command
-    result = CliRunner().invoke(APPLICATION, [*arguments, *more])
-    if result.exception and not isinstance(result.exception, SystemExit):
-        raise result.exception
-    assert result.exit_code == 0, f"{command}: {result.output}"
-    return [line.rstrip() for line in result.stdout.splitlines()]
 
 
 def transcript(text: str) -> Iterator[tuple[str, list[str]]]:
@@ -102,7 +71,7 @@ def run_in_terminals(text: str, place: str) -> None:
 
 def test_every_page_is_found_from_the_readme() -> None:
     assert PAGES
-    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    readme = README.read_text(encoding="utf-8")
     assert [page.name for page in PAGES if f"docs/{page.name}" not in readme] == []
 
 
@@ -133,30 +102,16 @@ def test_the_snippets_of_a_page(page: Path, tmp_path: Path, monkeypatch: pytest.
     assert ran
 
 
-@pytest.mark.parametrize("page", [ROOT / "README.md", *PAGES], ids=lambda page: page.stem)
+@pytest.mark.parametrize("page", [README, *PAGES], ids=lambda page: page.stem)
 def test_links_lead_somewhere(page: Path) -> None:
     targets = re.findall(r"\]\((?!https?:)([^)#]+)", page.read_text(encoding="utf-8"))
     assert [target for target in targets if not (page.parent / target).exists()] == []
 
 
-def readme_commands() -> list[str]:
-    """Return the command lines of README.md."""
-    lines = [line for block in blocks(ROOT / "README.md") for line in block.text.splitlines()]
-    return [line for line in lines if line.startswith("reconros ")]
-
-
-def test_the_readme_has_commands() -> None:
-    assert len(readme_commands()) > 20
-
-
-@pytest.mark.parametrize("command", readme_commands())
-def test_a_command_of_the_readme_is_there(command: str) -> None:
-    invoke(command, "--help")
-
-
-def test_a_command_that_is_not_there_is_noticed() -> None:
-    with pytest.raises(AssertionError, match="No such option"):
-        invoke("reconros run blink --mappings software", "--help")
+def test_pictures_of_the_pages_are_small() -> None:
+    pictures = [path for path in (ROOT / "docs").iterdir() if path.suffix != ".md"]
+    assert pictures
+    assert {path.name: path.stat().st_size for path in pictures if path.stat().st_size > 150_000} == {}
 
 
 def test_output_that_differs_is_noticed() -> None:

@@ -12,6 +12,7 @@ from reconros_zenoh.applications.roundtrip.inputs import SAMPLE
 from reconros_zenoh.board.profile import Profile, read_profile
 from reconros_zenoh.cli.experiment import app
 from reconros_zenoh.errors import ExperimentError, UsageError
+from reconros_zenoh.experiments import callbacks
 from reconros_zenoh.experiments.callbacks import TABLE_I, measure_callbacks, run_alone
 from reconros_zenoh.experiments.roundtrip import application_folder
 from reconros_zenoh.project.loader import load_project
@@ -154,3 +155,23 @@ def test_the_command_prints_one_object(table: dict[str, Any]) -> None:
     printed = json.loads(done.stdout)
     assert (printed.pop("digits"), printed.pop("accuracy") > 0.9) == (200, True)
     assert printed == table
+
+
+@pytest.mark.parametrize("options", [("--json",), ()], ids=["json", "table"])
+def test_callbacks_that_were_complete_before_an_interruption_are_kept(
+    monkeypatch: pytest.MonkeyPatch, options: tuple[str, ...]
+) -> None:
+    def interrupted(*arguments: Any) -> Any:
+        if "sort" in arguments and "software" in arguments:
+            raise KeyboardInterrupt
+        return run_alone(*arguments)
+
+    monkeypatch.setattr(callbacks, "run_alone", interrupted)
+    result = CliRunner().invoke(app, ["callbacks", "--repeat", "1", *options])
+    assert result.exit_code == 130
+    if options:
+        printed = json.loads(result.stdout)
+        assert (list(printed["callbacks"]), printed["interrupted"]) == (["sobel"], True)
+    else:
+        assert "sobel" in result.stdout
+        assert "sort" not in result.stdout

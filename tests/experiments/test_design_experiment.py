@@ -16,6 +16,7 @@ from typer.testing import CliRunner
 
 from board_daemon.hosting import BoardOptions
 from host_clients.camera import CameraOptions
+from host_clients.gallery import Gallery
 from reconros_zenoh.applications.design_example.control.plant import SETPOINT
 from reconros_zenoh.applications.design_example.picture import moving_picture
 from reconros_zenoh.applications.roundtrip.kernels.inverse import inverse_kinematics
@@ -24,11 +25,13 @@ from reconros_zenoh.board.control import status
 from reconros_zenoh.board.profile import read_profile
 from reconros_zenoh.cli.design import design
 from reconros_zenoh.errors import TransportError, UsageError
+from reconros_zenoh.experiments import design_virtual
 from reconros_zenoh.experiments.design import projects_folder
 from reconros_zenoh.experiments.simulation import Simulation
 from reconros_zenoh.project.loader import load_project
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
     from pathlib import Path
 
     from numpy.typing import NDArray
@@ -41,13 +44,13 @@ application = typer.Typer()
 application.command("design")(design)
 
 
-def run(folder: Path, *arguments: object) -> dict[str, Any]:
+def run(folder: Path, *arguments: object, status: int = 0) -> dict[str, Any]:
     """Return the object that the command prints."""
     words = ["--clock", "virtual", "--seconds", SECONDS, "--out", folder, "--json", *arguments]
     result = CliRunner().invoke(application, [str(word) for word in words])
     if result.exception and not isinstance(result.exception, SystemExit):
         raise result.exception
-    assert result.exit_code == 0, result.output
+    assert result.exit_code == status, result.output
     experiment: dict[str, Any] = json.loads(result.stdout)
     return experiment
 
@@ -149,6 +152,58 @@ def test_an_endless_run_is_refused(tmp_path: Path) -> None:
     result = CliRunner().invoke(application, ["--seconds", "inf", "--out", str(tmp_path)])
     assert result.exit_code == 2
     assert "--seconds" in result.output
+
+
+class Interrupted(Gallery):
+    """Ends the run at the third picture of a variant."""
+
+    endings: Iterator[bool]
+    """Whether to do so, for each variant."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._left = 3 if next(self.endings) else -1
+
+    def add(self, picture: NDArray[np.uint8]) -> None:
+        super().add(picture)
+        self._left -= 1
+        if not self._left:
+            raise KeyboardInterrupt
+
+
+@pytest.mark.parametrize("variants", [["one_slot"], ["one_slot", "two_slots"]])
+def test_what_was_measured_before_an_interruption_is_kept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, experiment: dict[str, Any], variants: list[str]
+) -> None:
+    monkeypatch.setattr(design_virtual, "Gallery", Interrupted)
+    Interrupted.endings = iter(name == variants[-1] for name in variants)
+    kept = run(tmp_path, status=130)
+    assert kept["interrupted"] is True
+    assert list(kept["variants"]) == variants
+    last = kept["variants"][variants[-1]]
+    assert last["frames_out"] == 3
+    assert 3 <= last["frames_in"] < experiment["variants"][variants[-1]]["frames_in"]
+    assert kept["shared_slot_costs_ms"].keys() == {"filter", "control"}
+    assert [cost is None for cost in kept["shared_slot_costs_ms"].values()] == [len(variants) == 1] * 2
+    assert json.loads((tmp_path / "virtual" / "experiment.json").read_text(encoding="utf-8")) == kept
+    with Image.open(tmp_path / "virtual" / variants[-1] / "filtered.gif") as animation:
+        assert animation.n_frames == 3
+    page = (tmp_path / "virtual" / "report.html").read_text(encoding="utf-8")
+    assert "The run was interrupted" in page
+    assert page.count("data:image/png") == 4 * len(variants)
+
+
+def test_an_interruption_before_anything_leaves_no_report_of_an_earlier_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupted(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    (tmp_path / "virtual").mkdir()
+    (tmp_path / "virtual" / "report.html").touch()
+    monkeypatch.setattr(Simulation, "run", interrupted)
+    assert run(tmp_path, status=130)["variants"] == {}
+    assert not (tmp_path / "virtual" / "report.html").exists()
 
 
 class Example:

@@ -15,6 +15,7 @@ from reconros_zenoh.board.bitstream_fit import BitstreamFit, frames, left_out_er
 from reconros_zenoh.board.profile import Profile, read_profile
 from reconros_zenoh.cli.experiment import app
 from reconros_zenoh.errors import UsageError
+from reconros_zenoh.experiments import reconfiguration
 from reconros_zenoh.experiments.reconfiguration import TABLE_II, Regression, measure_reconfiguration
 
 PROFILE = "miniitx-zynq7100"
@@ -209,3 +210,24 @@ def test_the_command_prints_one_object(table: dict[str, Any]) -> None:
     done = CliRunner().invoke(app, ["reconfiguration", "--region", RS0, "--region", ONE_COLUMN, "--json"])
     assert (done.exit_code, done.stderr) == (0, "")
     assert json.loads(done.stdout) == json.loads(json.dumps(table))
+
+
+@pytest.mark.parametrize("complete", [0, 1, 3])
+def test_slots_that_were_complete_before_an_interruption_are_kept(
+    monkeypatch: pytest.MonkeyPatch, complete: int
+) -> None:
+    row = reconfiguration._row
+
+    def interrupted(slot: Any, *arguments: Any) -> Any:
+        if slot.slot_id == complete:
+            raise KeyboardInterrupt
+        return row(slot, *arguments)
+
+    monkeypatch.setattr(reconfiguration, "_row", interrupted)
+    command = ["reconfiguration", "--writes", "1"]
+    shown, told = CliRunner().invoke(app, command), CliRunner().invoke(app, [*command, "--json"])
+    assert (shown.exit_code, told.exit_code) == (130, 130), shown.output
+    printed = json.loads(told.stdout)
+    assert (len(printed["slots"]), printed["interrupted"]) == (complete, True)
+    assert (printed["regression"] is None) == (complete < 3)  # RS0 and RS1 are alike
+    assert "printed t_rc, our regression" in shown.stdout

@@ -40,12 +40,12 @@ application = typer.Typer()
 application.command("simulate")(simulate)
 
 
-def run(*arguments: object) -> str:
+def run(*arguments: object, status: int = 0) -> str:
     """Return what the command prints; raise what it raises."""
     result = CliRunner().invoke(application, [str(argument) for argument in arguments], env={"COLUMNS": "80"})
     if result.exception and not isinstance(result.exception, SystemExit):
         raise result.exception
-    assert result.exit_code == 0, result.output
+    assert result.exit_code == status, result.output
     return result.stdout
 
 
@@ -94,9 +94,26 @@ def test_the_same_seed_gives_the_same_bytes_and_another_seed_others(tmp_path: Pa
     assert records(tmp_path / "first")["board0/sobel.csv"] != records(tmp_path / "other")["board0/sobel.csv"]
 
 
+def test_what_was_measured_before_an_interruption_is_kept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupted(simulation: Simulation) -> None:
+        simulation.environment.run(until=2_000_000_000)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Simulation, "run", interrupted)
+    answer = json.loads(run("-f", ROUNDTRIP, "--requests", 1000, "--out", tmp_path, "--json", status=130))
+    assert (answer["interrupted"], answer["simulated_s"]) == (True, 2)
+    cells = answer["boards"]["board0"]
+    assert 0 < cells["inverse"]["n"] < 1000
+    for name, content in records(tmp_path).items():
+        assert content.count(b",ok\n") == cells[Path(name).stem]["n"]
+
+
 def test_the_json_names_boards_and_services(tmp_path: Path) -> None:
     answer = json.loads(run("-f", ROUNDTRIP, "--boards", 2, "--requests", 2, "--out", tmp_path, "--json"))
-    assert answer.keys() == {"file", "simulated_s", "boards"}
+    assert answer.keys() == {"file", "simulated_s", "boards", "interrupted"}
+    assert answer["interrupted"] is False
     assert answer["simulated_s"] > 0
     assert answer["boards"].keys() == {"board0-0", "board0-1"}
     for services in answer["boards"].values():

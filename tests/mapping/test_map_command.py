@@ -173,5 +173,5 @@ def test_what_cannot_be_done_is_refused(arguments: tuple[object, ...], says: str
 
 
 def test_a_folder_without_a_project(tmp_path: Path) -> None:
-    with pytest.raises(FileError, match=r"build\.cfg: The file cannot be read"):
+    with pytest.raises(FileError, match=r"build\.cfg: cannot be read"):
         run(tmp_path)

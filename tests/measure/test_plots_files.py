@@ -32,6 +32,7 @@ def test_the_grid_has_a_panel_per_mapping_and_client(board_records):
     figure = grid_figure(board_records)
     assert titles(figure, "left") == ["sort", "inverse", "sobel", "mnist", "hash"] * 3
     assert titles(figure, "right")[5] == "2.63 ms (board 2.63)"
+    assert [axes.get_ylabel() for axes in figure.axes if axes.get_ylabel()] == list(board_records)
     # One time axis per client, so that mappings can be compared.
     limits = [axes.get_xlim() for axes in figure.axes]
     assert limits[:5] == limits[5:10] == limits[10:]

@@ -121,7 +121,7 @@ def test_files_that_cannot_be_read_are_named(tmp_path):
     with pytest.raises(FileError, match="cannot be read"):
         read_record(tmp_path)
     (tmp_path / "binary.csv").write_bytes(b"\xff\xfe\x00\x01")
-    with pytest.raises(FileError, match="not a text file"):
+    with pytest.raises(FileError, match="not UTF-8"):
         read_record(tmp_path / "binary.csv")
 
 

@@ -97,6 +97,14 @@ def test_what_is_not_utf_8_is_read_as_windows_1252(tmp_path: Path) -> None:
     assert found["warnings"] == [f"{path}:2: this is not UTF-8; it is read as Windows-1252."]
 
 
+@pytest.mark.parametrize("text", ["", "\n# nothing yet\n", "[Makefile]\nall = 1\n"])
+def test_a_file_with_nothing_of_a_project_is_refused(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "build.cfg"
+    path.write_text(text)
+    with pytest.raises(FileError, match=r"build\.cfg:1: this is no ReconROS project file.*reconros new"):
+        run(path)
+
+
 def test_the_keys_are_those_that_were_promised() -> None:
     found = facts(Path(__file__).parent / "wild" / "gateway.cfg")
     assert list(found) == [

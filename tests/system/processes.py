@@ -6,12 +6,24 @@ import os
 import signal
 import subprocess
 import sys
-from threading import Condition, Thread
-from typing import IO, Self
+import time
+from threading import Condition, Event, Thread
+from typing import IO, TYPE_CHECKING, Self
 
-LIMIT_S = 30
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+LIMIT_S = 60
 _OURS = {"RECONROS_ROUTER", "ROS_DOMAIN_ID"}
 RECONROS = ("-m", "reconros_zenoh")
+
+
+def wait_until(condition: Callable[[], bool]) -> None:
+    """Return when the condition, which is looked at every 50 ms, holds."""
+    end = time.monotonic() + LIMIT_S
+    while not condition():
+        assert time.monotonic() < end
+        Event().wait(0.05)
 
 
 def _environment() -> dict[str, str]:

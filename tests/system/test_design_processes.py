@@ -6,7 +6,8 @@ import json
 from signal import SIGINT, SIGTERM
 from typing import TYPE_CHECKING
 
-from processes import Process, run
+import psutil
+from processes import Process, run, wait_until
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -29,6 +30,26 @@ def test_both_variants_run_as_processes(tmp_path: Path) -> None:
         for file in ("last.png", "filtered.gif", "filter.csv", "control.csv"):
             assert (tmp_path / "wall" / name / file).stat().st_size > 0
     assert (tmp_path / "wall" / "report.html").exists()
+
+
+def test_an_interrupted_run_keeps_what_it_has(tmp_path: Path) -> None:
+    record = tmp_path / "wall" / "one_slot" / "filter.csv"
+    with Process(
+        *("experiment", "design", "--clock", "wall", "--seconds", "600", "--json", "--out", tmp_path)
+    ) as done:
+        wait_until(lambda: record.exists() and ",ok\n" in record.read_text(encoding="ascii"))
+        children = psutil.Process(done.pid).children(recursive=True)
+        assert done.end(SIGTERM) == 130, done
+    assert not psutil.wait_procs(children, timeout=10)[1]
+    experiment = json.loads("\n".join(done.out))
+    assert done.err == []
+    assert experiment["interrupted"] is True
+    (variant,) = experiment["variants"].values()
+    assert variant["frames_out"] > 0
+    assert variant["reconfigurations"] > 0
+    assert variant["frames_in"] is None
+    for name in ("experiment.json", "report.html", "one_slot/last.png"):
+        assert (tmp_path / "wall" / name).stat().st_size > 0
 
 
 def test_a_viewer_tells_where_its_page_is_and_ends_with_status_0(network: Network, tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from concurrent.futures import ThreadPoolExecutor
 from signal import SIGINT, SIGTERM, Signals
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -104,7 +105,7 @@ class VirtualRun(NamedTuple):
 
 @pytest.fixture(scope="module")
 def virtual(tmp_path_factory: pytest.TempPathFactory) -> dict[str, VirtualRun]:
-    """Return three runs, the first two with the same seed."""
+    """Return three runs, the first two with the same seed, as on a computer that never drew anything."""
     folder = tmp_path_factory.mktemp("virtual")
     mapping = folder / "mine.toml"
     mapping.write_bytes((application_folder() / "mappings" / "mixed.toml").read_bytes())
@@ -115,7 +116,8 @@ def virtual(tmp_path_factory: pytest.TempPathFactory) -> dict[str, VirtualRun]:
         return VirtualRun(done, folder / name / "virtual" / "mine")
 
     names = ("first", "again", "other")
-    with ThreadPoolExecutor() as pool:
+    with pytest.MonkeyPatch.context() as environment, ThreadPoolExecutor() as pool:
+        environment.setenv("MPLCONFIGDIR", str(folder / "matplotlib"))
         return dict(zip(names, pool.map(run_with, names, (7, 7, 8)), strict=True))
 
 
@@ -133,6 +135,14 @@ def test_virtual_time_gives_the_same_object_under_the_name_of_the_mapping_file(
     )
     assert experiment["mappings"].keys() == {"mine"}
     assert experiment["host"]["lag_p50_us"] is None
+
+
+def test_the_drawing_lies_beside_the_records_and_repeats_itself(virtual: dict[str, VirtualRun]) -> None:
+    first, again, other = (
+        (virtual[name].folder.parent / "roundtrips.png").read_bytes() for name in ("first", "again", "other")
+    )
+    assert first.startswith(b"\x89PNG")
+    assert first == again != other
 
 
 def test_virtual_time_repeats_itself_to_the_byte(
@@ -211,7 +221,8 @@ def test_an_interrupted_experiment_in_virtual_time_keeps_its_records(tmp_path: P
     arguments = ("--clock=virtual", "--mapping=all_hardware", ENDLESS, "--out", tmp_path)
     with Process(*ROUND_TRIP, *arguments) as experiment:
         experiment.wait_for("virtual time, all_hardware: 5000000 round trips ...")
-        assert experiment.end(number) == 130
+        os.kill(experiment.pid, number)
+        assert experiment.end(number) == 130  # some press Ctrl-C more than once
         cells = _interrupted(tmp_path, "virtual")
         assert sum(cell["n"] for cell in cells.values()) > 0
         assert "Traceback" not in repr(experiment)

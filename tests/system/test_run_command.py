@@ -52,7 +52,7 @@ def test_mistakes_end_with_status_2_and_one_line(tmp_path: Path) -> None:
     for arguments, place in (
         (("run", tmp_path / "blink", "--clock", "virtual"), "callbacks.py:1: SyntaxError"),
         (("check", path), f"{path}:3: "),
-        (("check", tmp_path / "nothing"), f"{tmp_path / 'nothing'}: The file cannot be read"),
+        (("check", tmp_path / "nothing"), f"{tmp_path / 'nothing'}: cannot be read"),
         (("new", tmp_path / "Blink"), "'Blink' cannot name a project"),
     ):
         done = run(*arguments)

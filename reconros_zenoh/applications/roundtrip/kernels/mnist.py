@@ -15,11 +15,13 @@ import cv2
 import numpy as np
 
 from reconros_zenoh.errors import FileError
+from reconros_zenoh.text_file import check_file
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 SIDE = 28
+_LIMIT_BYTES = 1_000_000_000
 MODEL = Path(__file__).parents[1] / "model" / "mnist.onnx"
 
 
@@ -78,9 +80,12 @@ def load_digits(path: Path) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
         "(uint8[count], 0 to 9); training/train.py writes one."
     )
     try:
+        check_file(path, remedy, _LIMIT_BYTES)
         with path.open("rb") as file:
             arrays = np.load(file, allow_pickle=False)
             images, labels = arrays["images"], arrays["labels"]
+    except FileError:
+        raise
     except OSError as error:
         raise FileError(path, None, f"cannot be read: {error.strerror or error}.", remedy) from error
     except KeyError as error:

@@ -1,0 +1,27 @@
+"""Experiments that a signal ends early."""
+
+from __future__ import annotations
+
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+
+@dataclass(slots=True)
+class Interruption:
+    """Whether Ctrl-C or SIGTERM has ended a block."""
+
+    happened: bool = False
+
+
+@contextmanager
+def until_interrupted() -> Iterator[Interruption]:
+    """Run the block to its end or to Ctrl-C or SIGTERM, so that what was measured is kept."""
+    interruption = Interruption()
+    try:
+        yield interruption
+    except (KeyboardInterrupt, SystemExit):  # the latter is SIGTERM while a deployment runs (`LocalRunner`)
+        interruption.happened = True
