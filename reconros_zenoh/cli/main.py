@@ -45,7 +45,7 @@ def main() -> None:
 
     Status 0: it did what was asked (router and board: until a signal came); 1: an experiment failed, or an
     answer was wrong or lost; 2: what was given cannot be used; 130: ended by Ctrl-C or SIGTERM before its
-    end (`up`: by SIGTERM 143).
+    end.
     """
     logging.basicConfig(level=logging.INFO, format="%(levelname)s %(name)s: %(message)s")
     logging.getLogger("matplotlib").setLevel(logging.ERROR)  # where its fonts are is nobody's concern
