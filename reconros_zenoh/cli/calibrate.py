@@ -25,10 +25,9 @@ from reconros_zenoh.experiments.calibration import (
 from reconros_zenoh.experiments.calibration import calibrate as fit
 from reconros_zenoh.experiments.measured import read_measurements
 from reconros_zenoh.experiments.profile_file import profile_file, replacing, with_values
-from reconros_zenoh.experiments.roundtrip import application_folder
+from reconros_zenoh.experiments.roundtrip import application
 from reconros_zenoh.measure.compare import grade
 from reconros_zenoh.measure.statistics import format_error, format_ms
-from reconros_zenoh.project.loader import load_project
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -76,7 +75,7 @@ def calibrate(
     start = read_profile(profile)
     source = profile_file(profile)
     constants = calibrated_constants(start)
-    project = load_project(application_folder())
+    project = application()
     measured = read_measurements([*data, *(more_data or [])], project, _assignments(mapping or []), trim=trim)
     with replacing(out) as file:
         total = planned_evaluations(constants, evaluations)

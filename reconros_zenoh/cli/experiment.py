@@ -20,14 +20,13 @@ from reconros_zenoh.experiments.roundtrip import (
     BoardReport,
     Plan,
     all_right,
-    application_folder,
+    application,
     finish,
     prepare,
 )
 from reconros_zenoh.measure.compare import print_tables
 from reconros_zenoh.measure.plots import write_grid
 from reconros_zenoh.measure.run import load_run
-from reconros_zenoh.project.loader import load_project
 
 app = typer.Typer(help="Run an experiment of the papers on emulated boards.", no_args_is_help=True)
 app.command("callbacks")(callbacks)
@@ -83,7 +82,7 @@ def plan(
     """Return the plan of an experiment; raise UsageError for a mapping or profile that cannot be used."""
     from reconros_zenoh.board.profile import read_profile
 
-    project = load_project(application_folder())
+    project = application()
     named: dict[str, Path] = {}
     for given in mappings:
         path = project.mapping_path(given)

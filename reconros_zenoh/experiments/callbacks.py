@@ -17,8 +17,7 @@ from reconros_zenoh.clock.wall import WallEnvironment
 from reconros_zenoh.errors import ExperimentError, UsageError
 from reconros_zenoh.experiments.interruption import until_interrupted
 from reconros_zenoh.experiments.provenance import host
-from reconros_zenoh.experiments.roundtrip import application_folder
-from reconros_zenoh.project.loader import load_project
+from reconros_zenoh.experiments.roundtrip import application
 from reconros_zenoh.project.mapping_file import CallbackMapping, Mapping
 from reconros_zenoh.rmw.node import Context
 from reconros_zenoh.transport.simulated import SimulatedNetwork
@@ -89,7 +88,7 @@ def measure_callbacks(
         raise UsageError(
             f"profile {profile.name!r} models no board that could be compared. Choose another --profile."
         )
-    project = load_project(application_folder())
+    project = application()
     quiet = _without_losses(profile, model)
     table = {}
     overruns = 0

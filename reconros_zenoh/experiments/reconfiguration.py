@@ -17,9 +17,8 @@ from reconros_zenoh.clock.virtual import VirtualEnvironment
 from reconros_zenoh.clock.wall import WallEnvironment
 from reconros_zenoh.errors import FileError, UsageError
 from reconros_zenoh.experiments.interruption import until_interrupted
-from reconros_zenoh.experiments.roundtrip import application_folder
+from reconros_zenoh.experiments.roundtrip import application
 from reconros_zenoh.project.ini import Option
-from reconros_zenoh.project.loader import load_project
 from reconros_zenoh.project.regions import read_regions
 from reconros_zenoh.project.resources import SlotResources, slot_resources
 from reconros_zenoh.rmw.node import Context
@@ -100,7 +99,7 @@ def measure_reconfiguration(
     if model is None:
         raise UsageError(f"profile {profile.name!r} models no configuration port. Choose another --profile.")
     estimates = [_estimate(text, profile, model) for text in regions]
-    project = load_project(application_folder())
+    project = application()
     environment = WallEnvironment() if clock == "wall" else VirtualEnvironment()
     network = SimulatedNetwork(environment)
     board = Board(environment, Context(network.transport("b0")), profile, project.slots)

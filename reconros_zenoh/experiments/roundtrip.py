@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cache
 from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -10,11 +11,13 @@ from typing import TYPE_CHECKING, Any, Literal
 from reconros_zenoh.experiments.provenance import host, provenance, write_experiment, writing
 from reconros_zenoh.measure.compare import experiment_tables
 from reconros_zenoh.measure.record import read_record
+from reconros_zenoh.project.loader import load_project
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from reconros_zenoh.measure.record import Record
+    from reconros_zenoh.project.loader import Project
 
 CLIENTS = ("inverse", "mnist", "sobel", "sort", "hash")
 """In the order in which the paper's Fig. 6 shows them."""
@@ -28,6 +31,12 @@ Clock = Literal["wall", "virtual"]
 def application_folder() -> Path:
     """Return the folder of the project that the experiment runs."""
     return Path(str(files("reconros_zenoh.applications.roundtrip")))
+
+
+@cache
+def application() -> Project:
+    """Return the project that the experiment runs, read once."""
+    return load_project(application_folder())
 
 
 @dataclass(frozen=True, slots=True)

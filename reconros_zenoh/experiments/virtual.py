@@ -10,10 +10,9 @@ from board_daemon.hosting import BoardOptions
 from host_clients.daemon import ClientOptions
 from reconros_zenoh.board.control import status
 from reconros_zenoh.board.profile import read_profile
-from reconros_zenoh.experiments.roundtrip import ANSWER_LIMIT_S, CLIENTS, BoardReport, application_folder
+from reconros_zenoh.experiments.roundtrip import ANSWER_LIMIT_S, CLIENTS, BoardReport, application
 from reconros_zenoh.experiments.simulation import Simulation
 from reconros_zenoh.measure.record import RecordWriter
-from reconros_zenoh.project.loader import load_project
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -48,7 +47,7 @@ def run_mapping(
 
     `on_round_trip` gets the client's name with each.
     """
-    project = load_project(application_folder())
+    project = application()
     with Simulation(project.types()) as simulation:
         hosted = simulation.add_board(
             profile, project, project.mapping(str(mapping)), BoardOptions(seed=seed)

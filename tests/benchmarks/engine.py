@@ -22,9 +22,8 @@ from board_daemon.hosting import BoardOptions
 from host_clients.daemon import ClientOptions
 from reconros_zenoh.board.profile import read_profile
 from reconros_zenoh.cli.experiment import MAPPINGS
-from reconros_zenoh.experiments.roundtrip import ANSWER_LIMIT_S, CLIENTS, application_folder
+from reconros_zenoh.experiments.roundtrip import ANSWER_LIMIT_S, CLIENTS, application
 from reconros_zenoh.experiments.simulation import Simulation
-from reconros_zenoh.project.loader import load_project
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator
@@ -43,7 +42,7 @@ LINK_NS = 300_000
 
 def ours(mapping: str, requests: int, seed: int) -> int:
     """Run the experiment under one mapping and return the board time that it covers [ns]."""
-    project = load_project(application_folder())
+    project = application()
     with Simulation(project.types()) as simulation:
         simulation.add_board(
             read_profile("miniitx-zynq7100"), project, project.mapping(mapping), BoardOptions(seed=seed)
