@@ -5,7 +5,7 @@ from __future__ import annotations
 from html import escape
 from typing import TYPE_CHECKING, Any
 
-from reconros_zenoh.measure.compare import MODULO_NOTE, grade
+from reconros_zenoh.measure.compare import error_note, grade
 from reconros_zenoh.measure.findings import findings, host_troubles
 from reconros_zenoh.measure.markup import figure, table, write_page
 from reconros_zenoh.measure.plots import grid_figure, inline_svg, spans_figure
@@ -113,7 +113,10 @@ def _section(experiment: Mapping[str, Any], records: Mapping[str, Mapping[str, R
         ),
         "<h3>Medians, and the real board's</h3>",
         _medians(experiment),
-        f'<p class="small">Times in ms. The error is our median against the real board\'s. {MODULO_NOTE}</p>',
+        (
+            '<p class="small">Times in ms. The error is our median against the real board\'s. '
+            f"{error_note(experiment['requests'])}</p>"
+        ),
         "<h3>Speedups</h3>",
         _speedups(experiment),
     ]

@@ -94,3 +94,9 @@ def test_long_names_are_folded_not_cut():
     assert "".join(line.split()[0] for line in lines[3:] if line.strip() and line[0] in name).startswith(
         "a_mapping"
     )
+
+
+@pytest.mark.parametrize(("requests", "warned"), [(100, True), (999, True), (1000, False)])
+def test_few_requests_are_no_verdict_on_a_median(board_records, requests, warned):
+    experiment = {**experiment_of(board_records), "requests": requests}
+    assert (f"of {requests}, one that lies between" in " ".join(printed(experiment).split())) is warned
