@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from html import escape
+from itertools import zip_longest
 from typing import TYPE_CHECKING
 
 from reconros_zenoh.errors import UsageError
@@ -23,27 +25,41 @@ p, li, figcaption { max-width: 52rem; }
 figure { margin: 1rem 0; } figcaption, .small { font-size: 0.87rem; opacity: 0.85; }
 .wide { overflow-x: auto; } .wide svg { display: block; width: 100%; min-width: 56rem; height: auto; }
 table { border-collapse: collapse; font-size: 0.9rem; font-variant-numeric: tabular-nums; }
-th, td { padding: 0.25rem 0.7rem; border-bottom: 1px solid var(--line); text-align: right; }
+th, td { padding: 0.25rem 0.7rem; border-bottom: 1px solid var(--line); text-align: left; }
 th { background: var(--soft); font-weight: 600; }
-th:nth-child(-n+2), td:nth-child(-n+2) { text-align: left; }
+.number { text-align: right; } td.number { white-space: nowrap; }
 .good { color: var(--good); } .fair { color: var(--fair); } .bad { color: var(--bad); }
 .bar { display: inline-block; height: 0.7em; background: var(--grey); vertical-align: baseline; }
 .warning { border-left: 4px solid var(--bad); background: var(--soft); padding: 0.6rem 1rem; }
 """
+
+_NUMBER = re.compile(r"[-+]?\d|-$|$")
 
 Cell = str | tuple[str, str]
 """A text, or a text and the style class of its cell."""
 
 
 def table(head: Iterable[str], rows: Iterable[Sequence[Cell]]) -> str:
-    """Return a table with these texts, which are never taken for markup."""
-    lines = ["<tr>" + "".join(f"<th>{escape(text)}</th>" for text in head) + "</tr>"]
-    for row in rows:
-        cells = [(cell, "") if isinstance(cell, str) else cell for cell in row]
-        lines.append(
-            "<tr>" + "".join(f'<td class="{style}">{escape(text)}</td>' for text, style in cells) + "</tr>"
+    """Return a table with these texts, which are never taken for markup; columns of numbers end alike."""
+    cells = [[(cell, "") if isinstance(cell, str) else cell for cell in row] for row in rows]
+    columns = [
+        "number" if all(_NUMBER.match(text) for text, _ in column) else "text"
+        for column in zip(*cells, strict=True)
+    ]
+    titles = zip_longest(head, columns, fillvalue="")
+    lines = [_row(f'<th class="{column}">{escape(title)}</th>' for title, column in titles)]
+    lines += [
+        _row(
+            f'<td class="{column} {style}">{escape(text)}</td>'
+            for (text, style), column in zip(row, columns, strict=True)
         )
+        for row in cells
+    ]
     return '<div class="wide"><table>' + "\n".join(lines) + "</table></div>"
+
+
+def _row(cells: Iterable[str]) -> str:
+    return f"<tr>{''.join(cells)}</tr>"
 
 
 def figure(svg: str, label: str, caption: str) -> str:
