@@ -38,6 +38,7 @@ def demo(
         experiment = run(planned, quiet=False)
         print_tables(console, experiment)
         if experiment["interrupted"]:
+            print(f"records and experiment.json are in {planned.folder}")
             raise typer.Exit(130)
         experiments.append(experiment)
     with run_bar("what each mechanism is worth", runs_of_ablation(planned.mappings), quiet=False) as advance:
