@@ -6,7 +6,7 @@ import re
 import socket
 from contextlib import ExitStack
 from itertools import count
-from threading import Condition, Thread
+from threading import Condition, Event, Thread, get_ident, local
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
@@ -624,6 +624,28 @@ def test_a_publisher_is_closed_while_another_thread_sends(router: str) -> None:
         thread.join(LIMIT_S)
         assert not thread.is_alive()
         assert KEY in str(refused[0])
+
+
+def test_a_thread_of_zenoh_keeps_its_state_from_one_callback_to_the_next(router: str) -> None:
+    of_thread = local()
+    inbox = Inbox(Condition())
+
+    def note(_: Sample) -> None:
+        inbox.put((get_ident(), hasattr(of_thread, "state")))
+        of_thread.state = True
+
+    with ZenohTransport.open(router) as here, ZenohTransport.open(router) as there:
+        matched = Event()
+        there.subscribe(KEY, note, DEFAULT)
+        publisher = here.publish(KEY, DEFAULT, lambda matching: matched.set() if matching else None)
+        assert matched.wait(LIMIT_S)
+        for number in range(1, 11):  # more than Zenoh has threads
+            publisher.put([b"x"], None)
+            with inbox.changed:
+                assert inbox.changed.wait_for(lambda number=number: len(inbox.items) == number, LIMIT_S)
+    known = [kept for place, (ident, kept) in enumerate(inbox.items) if ident in dict(inbox.items[:place])]
+    assert known
+    assert all(known)
 
 
 def test_no_router_is_said_in_one_sentence(capfd: pytest.CaptureFixture[str]) -> None:
