@@ -35,7 +35,7 @@ def print_result(benchmark: str, rows: Sequence[Mapping[str, Any]], *, as_json: 
         return
     table = Table(title=benchmark, title_justify="left")
     for name in rows[0]:
-        table.add_column(name, justify="right")
+        table.add_column(name.replace("_", " "), justify="right")
     for row in rows:
         table.add_row(*(f"{cell:.3g}" if isinstance(cell, float) else str(cell) for cell in row.values()))
     Console(width=110).print(table)
