@@ -36,7 +36,8 @@ if TYPE_CHECKING:
     from reconros_zenoh.project.mapping_file import Mapping
     from reconros_zenoh.ros.types import TypeRegistry
 
-_exchange = lru_cache(maxsize=2 * len(EXCHANGES))(exchange)
+_SEEDS_KEPT = 4  # 15 MB each
+_exchange = lru_cache(maxsize=_SEEDS_KEPT * len(EXCHANGES))(exchange)
 
 
 class Simulation:
@@ -44,7 +45,7 @@ class Simulation:
 
     The same boards and clients, added in the same order, give the same round trips on any machine.
     What does not change is held once, whatever their number: message types, the requests of clients with one
-    name and seed, and the right answers to them.
+    name and seed, and the right answers to them. Those of the last few seeds are kept for later simulations.
     """
 
     def __init__(self, types: TypeRegistry) -> None:

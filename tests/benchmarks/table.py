@@ -38,4 +38,4 @@ def print_result(benchmark: str, rows: Sequence[Mapping[str, Any]], *, as_json: 
         table.add_column(name.replace("_", " "), justify="right")
     for row in rows:
         table.add_row(*(f"{cell:.3g}" if isinstance(cell, float) else str(cell) for cell in row.values()))
-    Console(width=110).print(table)
+    Console(width=130).print(table)
