@@ -156,7 +156,5 @@ class SoftwareContext:
             self._release(mutex)
 
     def _release(self, mutex: Mutex) -> None:
-        with suppress(
-            CallbackError
-        ):  # it is not held, or its holder has just given it back in another thread
+        with suppress(CallbackError):  # not held, or just given back by its holder in another thread
             mutex.unlock(self)

@@ -36,7 +36,7 @@ def up(
     folder = StateFolder(file, environment)
     console = _console(quiet=as_json)
     screen = ServiceScreen(console, deployment.services, None if detach or as_json else folder.logs)
-    failure: ExperimentError | SystemExit | typer.Exit | None = None
+    failure: ExperimentError | typer.Exit | None = None
     error = ""
     try:
         with screen:

@@ -7,8 +7,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from reconros_zenoh.errors import UsageError
-from reconros_zenoh.experiments.provenance import machine, provenance, write_experiment
+from reconros_zenoh.experiments.provenance import machine, provenance, write_experiment, writing
 from reconros_zenoh.measure.record import read_record
 from reconros_zenoh.measure.statistics import summarise
 
@@ -71,17 +70,13 @@ class Ending:
 
 def prepare(plan: DesignPlan) -> None:
     """Make the folders of the run, without what an earlier run left; raise UsageError if that fails."""
-    try:
+    with writing(plan.folder):
         for variant in VARIANTS:
             plan.variant_folder(variant).mkdir(parents=True, exist_ok=True)
             for name in FILES:
                 (plan.variant_folder(variant) / name).unlink(missing_ok=True)
         for name in ("experiment.json", REPORT):
             (plan.folder / name).unlink(missing_ok=True)
-    except OSError as error:
-        raise UsageError(
-            f"{plan.folder} cannot be written ({error.strerror}). Choose another folder with --out."
-        ) from None
 
 
 def finish(plan: DesignPlan, endings: Mapping[str, Ending], *, interrupted: bool) -> dict[str, Any]:

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
     from pathlib import Path
 
+    from board_daemon.hosting import HostedBoard
     from reconros_zenoh.board.profile import Profile
     from reconros_zenoh.experiments.roundtrip import Plan
     from reconros_zenoh.measure.record import RoundTrip
@@ -47,24 +48,35 @@ def run_mapping(
 
     `on_round_trip` gets the client's name with each.
     """
-    project = application()
-    with Simulation(project.types()) as simulation:
-        hosted = simulation.add_board(
-            profile, project, project.mapping(str(mapping)), BoardOptions(seed=seed)
-        )
-        for client in CLIENTS:
-            options = ClientOptions(
-                client,
-                "",
-                requests,
-                limit_s=ANSWER_LIMIT_S,
-                seed=seed,
-                group="roundtrip",
-                members=len(CLIENTS),
-            )
-            simulation.add_client(options, partial(on_round_trip, client))
+    with Simulation(application().types()) as simulation:
+        hosted = add_board_and_clients(simulation, profile, mapping, requests, seed, on_round_trip)
         simulation.run()
         return status(hosted.board, hosted.executor)
+
+
+def add_board_and_clients(
+    simulation: Simulation,
+    profile: Profile,
+    mapping: Path,
+    requests: int,
+    seed: int,
+    on_round_trip: Callable[[str, RoundTrip], None],
+) -> HostedBoard:
+    """Return the board of the experiment, with its five clients in the simulation; see `run_mapping`."""
+    project = application()
+    hosted = simulation.add_board(profile, project, project.mapping(str(mapping)), BoardOptions(seed=seed))
+    for client in CLIENTS:
+        options = ClientOptions(
+            client,
+            "",
+            requests,
+            limit_s=ANSWER_LIMIT_S,
+            seed=seed,
+            group="roundtrip",
+            members=len(CLIENTS),
+        )
+        simulation.add_client(options, partial(on_round_trip, client))
+    return hosted
 
 
 def _record(

@@ -18,12 +18,11 @@ from unittest.mock import patch
 import simpy
 from table import arguments, print_result
 
-from board_daemon.hosting import BoardOptions
-from host_clients.daemon import ClientOptions
 from reconros_zenoh.board.profile import read_profile
 from reconros_zenoh.cli.experiment import MAPPINGS
-from reconros_zenoh.experiments.roundtrip import ANSWER_LIMIT_S, CLIENTS, application
+from reconros_zenoh.experiments.roundtrip import CLIENTS, application
 from reconros_zenoh.experiments.simulation import Simulation
+from reconros_zenoh.experiments.virtual import add_board_and_clients
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator
@@ -42,24 +41,9 @@ LINK_NS = 300_000
 
 def ours(mapping: str, requests: int, seed: int) -> int:
     """Run the experiment under one mapping and return the board time that it covers [ns]."""
-    project = application()
-    with Simulation(project.types()) as simulation:
-        simulation.add_board(
-            read_profile("miniitx-zynq7100"), project, project.mapping(mapping), BoardOptions(seed=seed)
-        )
-        for client in CLIENTS:
-            simulation.add_client(
-                ClientOptions(
-                    client,
-                    "",
-                    requests,
-                    ANSWER_LIMIT_S,
-                    seed=seed,
-                    group="engine",
-                    members=len(CLIENTS),
-                ),
-                lambda _: None,
-            )
+    profile, path = read_profile("miniitx-zynq7100"), application().mapping_path(mapping)
+    with Simulation(application().types()) as simulation:
+        add_board_and_clients(simulation, profile, path, requests, seed, lambda *_: None)
         simulation.run()
         return simulation.environment.now
 
