@@ -5,6 +5,8 @@ from __future__ import annotations
 from threading import Lock
 from typing import TYPE_CHECKING, Generic, Protocol, TypeVar
 
+import numpy as np
+
 if TYPE_CHECKING:
     from collections.abc import Callable
 
@@ -47,16 +49,20 @@ class Frames(Generic[_Frame]):
         size = sum(map(len, parts))
         if size < _SMALLEST_FRAME_BYTES or (frame := self._allocate(size)) is None:
             return b"".join(parts)
-        at = 0
-        for part in parts:
-            if isinstance(part, memoryview):
+        # From the last to the first: what a part brings of the bytes before it is then written over.
+        end = size
+        for part in reversed(parts):
+            at = end - len(part)
+            if not isinstance(part, memoryview):
+                frame[at:end] = part
+            elif (whole := _ending_with(part)) is not None and len(whole) <= end:
+                frame[end - len(whole) : end] = whole
+            else:
                 # Piece by piece, the copy that a frame needs of a memoryview stays in the cache.
                 for start in range(0, len(part), _PIECE_BYTES):
-                    piece = b"".join((part[start : start + _PIECE_BYTES],))
+                    piece = bytes(part[start : start + _PIECE_BYTES])
                     frame[at + start : at + start + len(piece)] = piece
-            else:
-                frame[at : at + len(part)] = part
-            at += len(part)
+            end = at
         return frame
 
     def _allocate(self, size: int) -> _Frame | None:
@@ -77,3 +83,18 @@ class Frames(Generic[_Frame]):
         self._pools.append(pool)  # the last frames of the smaller ones may still be on their way
         self._pool_bytes = pool_bytes
         return True
+
+
+def _ending_with(part: memoryview) -> bytes | None:
+    """Return the bytes object at whose end the part lies, as an array of a received message does, if any."""
+    owner: object = part
+    while isinstance(owner, memoryview | np.ndarray):
+        owner = owner.obj if isinstance(owner, memoryview) else owner.base
+    if not (isinstance(owner, bytes) and part):
+        return None
+    return owner if _end(part) == _end(owner) else None
+
+
+def _end(buffer: bytes | memoryview) -> int:
+    array = np.frombuffer(buffer, np.uint8)
+    return int(array.__array_interface__["data"][0]) + len(array)

@@ -9,6 +9,7 @@ it.
 
 from __future__ import annotations
 
+import math
 import os
 import statistics
 import subprocess
@@ -104,7 +105,7 @@ def messages(types: TypeRegistry) -> list[tuple[str, str, Any, int]]:
     sizes = {"Image 8 KiB": (64, 128), "Image 900 KiB": (480, 1920), "Image 6 MiB": (1080, 5760)}
     rows: list[tuple[str, str, Any, int]] = [("UInt32", "number", uint32, 1000)]
     for (name, shape), count in zip(sizes.items(), (1000, 200, 60), strict=True):
-        picture = rng.integers(256, size=shape, dtype=np.uint8)
+        picture = np.frombuffer(rng.bytes(math.prod(shape)), np.uint8).reshape(shape)
         rows.append((name, "image", image_message(types, "mono8", picture), count))
     return rows
 

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -45,10 +46,22 @@ class SharedMemory:
         return allocate
 
 
+def behind_a_header(content: bytes) -> memoryview:
+    return memoryview(b"header" + content)[6:]
+
+
+def before_a_trailer(content: bytes) -> memoryview:
+    return memoryview(content + b"trailer")[:-7]
+
+
+def array(content: bytes) -> memoryview:
+    return memoryview(np.frombuffer(bytearray(content), np.uint8))
+
+
 part = st.builds(
     lambda size, kind: kind((bytes(range(256)) * (size // 256 + 1))[:size]),
     st.integers(0, 700 * KIB),
-    st.sampled_from([bytes, bytearray, memoryview]),
+    st.sampled_from([bytes, bytearray, memoryview, behind_a_header, before_a_trailer, array]),
 )
 
 
