@@ -21,7 +21,9 @@ if TYPE_CHECKING:
 
     import simpy
 
-_SPIN_NS = 100_000
+_LEAD_NS = (20_000, 500_000)
+_LEAD_STEP_NS = 5_000
+_LATE_SLEEPS = 0.05
 _TURN_NS = 1_000_000
 # A signal that comes just as the sleep begins is served when it ends.
 _NAP_NS = 1_000_000_000
@@ -46,9 +48,10 @@ class WallEnvironment(VirtualEnvironment):
     model does not drift, the loop catches up. Calls come in from any thread through `post`.
 
     The loop belongs to whoever has the turn. The thread in `run` takes it when the next event is due: it
-    sleeps until then, the last tenth of a millisecond it spins, because a sleep ends about that much late. A
-    thread that posts takes the turn itself when it is free and does what is due, for to wake another thread
-    takes longer than most messages do. Before `run` and after it nobody has the turn: posted calls wait.
+    sleeps until shortly before and spins the rest, because a sleep ends late. By how much on this host it
+    learns, so that one sleep in twenty ends after its event. A thread that posts takes the turn itself when
+    it is free and does what is due, for to wake another thread takes longer than most messages do. Before
+    `run` and after it nobody has the turn: posted calls wait.
     """
 
     def __init__(self) -> None:
@@ -58,6 +61,7 @@ class WallEnvironment(VirtualEnvironment):
         self._turn.acquire()
         self._alarm: SimpleQueue[None] = SimpleQueue()
         self._asleep_until: float = -1
+        self._lead_ns: float = 100_000
         self._failure: BaseException | None = None
         self._lags_ns: deque[int] = deque(maxlen=_LAGS_KEPT)
 
@@ -136,22 +140,31 @@ class WallEnvironment(VirtualEnvironment):
 
     def _sleep(self, until_ns: float) -> None:
         """Return at the time, or when there is something to do before it."""
+        lead_ns = self._lead_ns
         while not self._inbox:
             early_ns = until_ns - time.monotonic_ns()
             if early_ns <= 0:
                 return
-            if early_ns <= _SPIN_NS:
+            if early_ns <= lead_ns:
                 time.sleep(0)  # lets other threads have the interpreter
                 continue
             self._asleep_until = until_ns
             # A thread whose turn ended before the line above could not see how long we sleep.
             if self._failure is not None or self.peek() < until_ns:
                 return
+            nap_ns = early_ns - lead_ns
             try:
-                self._alarm.get(timeout=min(early_ns - _SPIN_NS, _NAP_NS) / 1e9)
+                self._alarm.get(timeout=min(nap_ns, _NAP_NS) / 1e9)
             except Empty:
+                if nap_ns <= _NAP_NS:
+                    self._learn_lead(time.monotonic_ns() > until_ns)
                 continue
             return
+
+    def _learn_lead(self, is_late: bool) -> None:
+        """Adjust how long before an event a sleep is to end."""
+        step_ns = _LEAD_STEP_NS * (is_late - _LATE_SLEEPS)
+        self._lead_ns = min(max(self._lead_ns + step_ns, _LEAD_NS[0]), _LEAD_NS[1])
 
 
 def keep_time() -> None:

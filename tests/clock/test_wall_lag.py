@@ -13,12 +13,13 @@ from reconros_zenoh.clock.wall import Lag, WallEnvironment
 
 
 class Sleep(SimpleQueue[None]):
-    """A sleep that nothing ends early, but the first is off by some time."""
+    """A sleep that nothing ends early, but the first is off by some time, or all are."""
 
-    def __init__(self, made_up: MadeUpTime, off_ns: int) -> None:
+    def __init__(self, made_up: MadeUpTime, off_ns: int, *, always: bool = False) -> None:
         super().__init__()
         self._time = made_up
         self._off_ns = off_ns
+        self._always = always
         self.lengths_ns: list[int] = []
 
     def get(self, block: bool = True, timeout: float | None = None) -> None:
@@ -26,7 +27,8 @@ class Sleep(SimpleQueue[None]):
         length_ns = round(timeout * 1e9)
         self.lengths_ns.append(length_ns)
         self._time.now_ns += length_ns + self._off_ns
-        self._off_ns = 0
+        if not self._always:
+            self._off_ns = 0
         raise Empty
 
 
@@ -96,7 +98,7 @@ def test_lag_forgets_all_but_the_last_events(made_up: MadeUpTime, monkeypatch: p
 
 
 @pytest.mark.parametrize(("off_ns", "spins"), [(0, 4), (99 * US, 1), (150 * US, 0)])
-def test_the_loop_sleeps_until_a_tenth_of_a_millisecond_before_an_event_and_spins_the_rest(
+def test_a_new_loop_sleeps_until_a_tenth_of_a_millisecond_before_an_event_and_spins_the_rest(
     made_up: MadeUpTime, off_ns: int, spins: int
 ) -> None:
     environment = WallEnvironment()
@@ -111,7 +113,29 @@ def test_a_sleep_that_ends_early_goes_on(made_up: MadeUpTime) -> None:
     environment = WallEnvironment()
     sleep = environment._alarm = Sleep(made_up, -MS)
     environment.run(until=environment.timeout(4 * MS))
-    assert sleep.lengths_ns == [3_900 * US, 1_000 * US]
+    assert sleep.lengths_ns == pytest.approx([3_900 * US, 1_000 * US], rel=0.001)
+
+
+@pytest.mark.parametrize("off_us", [0, 40, 170, 400])
+def test_the_loop_learns_how_late_its_sleeps_end(made_up: MadeUpTime, off_us: int) -> None:
+    environment = WallEnvironment()
+    sleep = environment._alarm = Sleep(made_up, off_us * US + 1, always=True)
+    late = 0
+    for number in range(1000):
+        environment.run(until=environment.timeout(2 * MS))
+        late += number >= 500 and made_up.spins == 0
+        made_up.spins = 0
+    assert late == pytest.approx(0 if off_us == 0 else 25, abs=2)
+    # And no earlier than it must: the rest of a sleep that ends early is spun away.
+    assert 2 * MS - sleep.lengths_ns[-1] == pytest.approx(max(off_us, 20) * US, abs=40 * US)
+
+
+def test_however_late_sleeps_end_the_loop_spins_half_a_millisecond_at_most(made_up: MadeUpTime) -> None:
+    environment = WallEnvironment()
+    environment._alarm = Sleep(made_up, MS, always=True)
+    for _ in range(1000):
+        environment.run(until=environment.timeout(2 * MS))
+    assert environment.lag().p50_us == pytest.approx(500)
 
 
 def test_a_call_whose_thread_was_held_up_while_it_posted_comes_now(made_up: MadeUpTime) -> None:
