@@ -318,7 +318,7 @@ class Writer:
 
     def put(self, parts: Parts, timeline: Timeline, send: Callable[[], None]) -> None:
         """Have `send` called when a message of these parts has gone through the stack and over the link."""
-        self._stream.put(_Outgoing(send, sum(len(part) for part in parts), timeline))
+        self._stream.put(_Outgoing(send, sum(map(len, parts)), timeline))
 
     def _send(self, outgoing: _Outgoing) -> Generator[Awaitable, object, None]:
         yield from self._board.dds.send(outgoing.size, outgoing.timeline)

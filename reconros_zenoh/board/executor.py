@@ -95,6 +95,8 @@ class Executor:
         self._workers_of: dict[str, list[Worker]] = {}
         model = board.profile.model
         self._poll_jitter = model.executor.poll_jitter.share if model else 0.0
+        self.dispatch_ns = model.executor.dispatch.ns if model else 0
+        """The core time [ns] of taking a message and starting its callback."""
         self.calls: Counter[str] = Counter()
         self.failures: Counter[str] = Counter()
         self._ways_to_fail: defaultdict[str, Failures] = defaultdict(Failures)
@@ -239,12 +241,6 @@ class Executor:
             return 0
         drift_ns = poll_ns * self._poll_jitter * math.sqrt(idle_ns / poll_ns)
         return round(-(idle_ns + self.board.randomness.gauss(0, drift_ns)) % poll_ns)
-
-    @property
-    def dispatch_ns(self) -> int:
-        """The core time [ns] of taking a message and starting its callback."""
-        model = self.board.profile.model
-        return model.executor.dispatch.ns if model else 0
 
     def _register(
         self, name: str, kind: CallbackKind, source: Source, check: Callable[[Any], None] | None

@@ -7,7 +7,6 @@ import time
 from collections import OrderedDict
 from concurrent.futures import Future, wait
 from dataclasses import dataclass
-from functools import partial
 from typing import TYPE_CHECKING, Any, Generic, TypeVar, cast
 
 import numpy as np
@@ -69,6 +68,13 @@ class _Done(Generic[R_co]):
         return cast("R_co", self._result)
 
 
+def _in_line(function: Callable[..., R], *arguments: object) -> _Done[R]:
+    try:
+        return _Done(function(*arguments), None)
+    except Exception as error:  # noqa: BLE001 - handed to whoever asks for the result
+        return _Done(None, error)
+
+
 class Host:
     """Runs the real computation while the model decides when its result is ready.
 
@@ -101,16 +107,13 @@ class Host:
         """
         if limit is not None:
             return self._start_limited(limit, function, *arguments)
-        if self._pool is not None:
-            if task is None:
-                return self._pool.submit(function, *arguments)
-            if self._expected_ns.get(task, self._in_line_ns) >= self._in_line_ns:
-                return self._pool.submit(self._timed, task, function, *arguments)
-            function = partial(self._timed, task, function)
-        try:
-            return _Done(function(*arguments), None)
-        except Exception as error:  # noqa: BLE001 - handed to whoever asks for the result
-            return _Done(None, error)
+        if self._pool is None:
+            return _in_line(function, *arguments)
+        if task is None:
+            return self._pool.submit(function, *arguments)
+        if self._expected_ns.get(task, self._in_line_ns) >= self._in_line_ns:
+            return self._pool.submit(self._timed, task, function, *arguments)
+        return _in_line(self._timed, task, function, *arguments)
 
     def _start_limited(
         self, limit: Limit, function: Callable[..., R], *arguments: object

@@ -53,21 +53,20 @@ class Subscription(Endpoint):
         self._subscription.close()
 
     def _on_sample(self, sample: Sample) -> None:
+        key, attachment, payload = sample
         sender = None
         try:
-            if sample.key != self.key:
-                raise _foreign(sample.key, self.key)
-            attachment = Attachment.decode(sample.attachment)
-            sender = attachment.gid
-            payload = sample.read()
+            if key != self.key:
+                raise _foreign(key, self.key)
+            _, source_timestamp_ns, sender = Attachment.decode(attachment)
             message = self._type.decode(payload)
             if self._check is not None:
                 self._check(message)
         except BadMessageError as error:
-            self.context.rejections.add(sample.key, sender.hex() if sender else None, error)
+            self.context.rejections.add(key, sender.hex() if sender else None, error)
             return
-        transit_ns = self.context.clock_ns() - attachment.source_timestamp_ns
-        self._sink(Received(message, len(payload), transit_ns, publisher=attachment.gid))
+        transit_ns = self.context.clock_ns() - source_timestamp_ns
+        self._sink(Received(message, len(payload), transit_ns, None, sender))
 
 
 def _foreign(key: str, own: str) -> BadMessageError:

@@ -66,7 +66,9 @@ class MessageType:
         self.cls: type[Any] = definition.cls
         self._store = store
         self._nested: dict[str, MessageType] = {}
-        self._deserialize = definition.deserialize_cdr_le
+        self._size = definition.getsize_cdr
+        self._serialize_body = definition.serialize_cdr_le
+        self._deserialize_body = definition.deserialize_cdr_le
         self.fields = definition.fields
         self._fields_before = [field for field, _ in definition.fields[:-1]]
         self._last_array = _last_array(definition.fields)
@@ -113,32 +115,36 @@ class MessageType:
         in them does, and `foreign_encoding` for another encapsulation than CDR little endian and for
         strings that are not UTF-8.
         """
-        view = memoryview(payload)
-        if len(view) < _ENCAPSULATION_LENGTH:
-            raise BadMessageError("truncated", f"{self.name}: {len(view)} bytes hold no encapsulation header")
-        encapsulation = int.from_bytes(view[:2], "big")
+        if len(payload) < _ENCAPSULATION_LENGTH:
+            raise BadMessageError(
+                "truncated", f"{self.name}: {len(payload)} bytes hold no encapsulation header"
+            )
+        encapsulation = payload[0] << 8 | payload[1]
         if encapsulation != _LITTLE_ENDIAN:
             kind = _ENCAPSULATIONS.get(encapsulation, "unknown")
             raise BadMessageError(
                 "foreign_encoding",
                 f"{self.name}: encapsulation {encapsulation:04x} ({kind}), not 0001 (CDR little endian)",
             )
-        body = view[_ENCAPSULATION_LENGTH:]
+        body = memoryview(payload)[_ENCAPSULATION_LENGTH:]
         try:
-            message, end = self._deserialize(body, 0, self.cls, self._store)
+            message, end = self._deserialize_body(body, 0, self.cls, self._store)
         except UnicodeDecodeError as error:
             raise BadMessageError(
                 "foreign_encoding", f"{self.name}: a string is not UTF-8: {error}"
             ) from error
         except (SerdeError, ValueError, struct.error) as error:
-            raise BadMessageError("truncated", f"{self.name}, {len(view)} bytes: {error}") from error
+            raise BadMessageError("truncated", f"{self.name}, {len(payload)} bytes: {error}") from error
         # Some DDS implementations fill the last word of a payload.
         if len(body) > end + -end % 4:
             raise BadMessageError("truncated", f"{self.name}: {len(body) - end} bytes follow the message")
         return message
 
     def _serialize(self, message: Any) -> bytes:
-        return bytes(self._store.serialize_cdr(message, self.name, little_endian=True))
+        data = bytearray(_ENCAPSULATION_LENGTH + self._size(0, message, self._store))
+        data[1] = _LITTLE_ENDIAN
+        self._serialize_body(memoryview(data)[_ENCAPSULATION_LENGTH:], 0, message, self._store)
+        return bytes(data)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -31,22 +31,15 @@ OnMatching: TypeAlias = Callable[[bool], None]
 """Gets whether there is a counterpart: the present state at once, then each change."""
 
 
-class Sample(Protocol):
-    """A message that a subscription received."""
+class Sample(NamedTuple):
+    """A message that a subscription received: the key it was published on, and what was put.
 
-    @property
-    def key(self) -> str:
-        """The key it was published on: without wildcards."""
+    The payload has format `B`, is read-only and does not change any more.
+    """
 
-    @property
-    def attachment(self) -> bytes | None:
-        """The attachment it was published with."""
-
-    def read(self) -> memoryview:
-        """Copy the payload out of the transport: format `B`, read-only, stable after the sink returned.
-
-        Call it once; it may be called after the sink returned, from any thread.
-        """
+    key: str
+    attachment: bytes | None
+    payload: memoryview
 
 
 class Request(Protocol):
@@ -61,7 +54,7 @@ class Request(Protocol):
         """The attachment it was sent with."""
 
     def read(self) -> memoryview:
-        """Copy the payload out of the transport, as `Sample.read` does; before the reply."""
+        """Copy the payload out of the transport, as a `Sample` has it; to be called once, before the reply."""
 
     def reply(self, parts: Parts, attachment: bytes | None) -> None:
         """Answer it; without effect when the client no longer waits."""

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from reconros_zenoh.errors import TransportError
 from reconros_zenoh.ros.qos import Durability
-from reconros_zenoh.transport.base import Reply
+from reconros_zenoh.transport.base import Reply, Sample
 from reconros_zenoh.transport.guard import Closing, GuardedDeclaration
 from reconros_zenoh.transport.key_expressions import check_concrete, check_key, intersects
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from reconros_zenoh.clock.virtual import VirtualEnvironment
     from reconros_zenoh.ros.qos import QosProfile
-    from reconros_zenoh.transport.base import OnMatching, OnReply, Parts, Request, Sample
+    from reconros_zenoh.transport.base import OnMatching, OnReply, Parts, Request
 
 
 class SimulatedNetwork:
@@ -139,27 +139,13 @@ class _Matcher(_Declaration):
                 self.post(self._on_matching, matched)
 
 
-class _Sample:
-    """A message on its way; shared by all who get it."""
-
-    __slots__ = ("_parts", "attachment", "key")
-
-    def __init__(self, key: str, attachment: bytes | None, parts: Parts) -> None:
-        self.key = key
-        self.attachment = attachment
-        self._parts = parts
-
-    def read(self) -> memoryview:
-        return _payload(self._parts)
-
-
 class _Publisher(_Matcher):
     __slots__ = ("_route", "cache")
 
     def __init__(self, home: _Home, key: str, qos: QosProfile, on_matching: OnMatching | None) -> None:
         super().__init__(home, key, on_matching)
         transient = qos.durability is Durability.TRANSIENT_LOCAL
-        self.cache: deque[_Sample] | None = deque(maxlen=qos.depth) if transient else None
+        self.cache: deque[Sample] | None = deque(maxlen=qos.depth) if transient else None
         self._route: tuple[_Subscription, ...] = ()
         self.network.publishers[self] = None
         self.find_route()
@@ -173,7 +159,7 @@ class _Publisher(_Matcher):
         self.check_open()
         if not self._route and self.cache is None:
             return
-        sample = _Sample(self.key, attachment, parts)
+        sample = Sample(self.key, attachment, _payload(parts))
         if self.cache is not None:
             self.cache.append(sample)
         for subscription in self._route:

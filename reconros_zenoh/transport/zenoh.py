@@ -18,7 +18,7 @@ from zenoh.handlers import Callback
 
 from reconros_zenoh.errors import TransportError
 from reconros_zenoh.ros.qos import Durability, History, Reliability
-from reconros_zenoh.transport.base import Reply
+from reconros_zenoh.transport.base import Reply, Sample
 from reconros_zenoh.transport.changes import MatchingChanges, TokenChanges, gather
 from reconros_zenoh.transport.frames import Frames
 from reconros_zenoh.transport.guard import Closing, GuardedDeclaration
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from reconros_zenoh.ros.qos import QosProfile
-    from reconros_zenoh.transport.base import OnMatching, OnReply, Parts, Request, Sample
+    from reconros_zenoh.transport.base import OnMatching, OnReply, Parts, Request
 
 _HEARTBEAT_S = 0.5
 
@@ -100,7 +100,10 @@ class ZenohTransport(Closing):
             with declaration.lock:  # this is `call`, written out because every message comes this way
                 if not declaration.is_closed:
                     try:
-                        sink(_Sample(str(sample.key_expr) if is_pattern else key, sample))
+                        came_on = str(sample.key_expr) if is_pattern else key
+                        attachment = sample.attachment
+                        beside = None if attachment is None else attachment.to_bytes()
+                        sink(Sample(came_on, beside, memoryview(sample.payload.to_bytes())))
                     except Exception:  # noqa: BLE001 # as in `call`
                         declaration.log_failure()
 
@@ -257,18 +260,6 @@ class _Publisher(_Declaration):
 
     def _refuse(self, payload: object, *, attachment: object) -> None:  # noqa: ARG002 # stands in for `put`
         self.check_open()
-
-
-class _Sample:
-    __slots__ = ("_sample", "attachment", "key")
-
-    def __init__(self, key: str, sample: zenoh.Sample) -> None:
-        self.key = key
-        self.attachment = None if (attachment := sample.attachment) is None else attachment.to_bytes()
-        self._sample = sample
-
-    def read(self) -> memoryview:
-        return memoryview(self._sample.payload.to_bytes())
 
 
 class _Request:

@@ -147,7 +147,7 @@ def test_nothing_is_in_the_network_but_through_the_tap() -> None:
         board = Board(quiet.environment, quiet.context, quiet.profile, (), name="b", tap=tap)
         listener = desktop(board)
         listener.transport.subscribe(
-            "**", lambda sample, tap=tap: heard.append((tap, sample.key, bytes(sample.read()))), QosProfile()
+            "**", lambda sample, tap=tap: heard.append((tap, sample.key, bytes(sample.payload))), QosProfile()
         )
         stream = Stream(board)
         stream.fifo("a")

@@ -43,7 +43,7 @@ class Inbox:
             self.changed.notify_all()
 
     def put_text(self, sample: Sample) -> None:
-        self.put(bytes(sample.read()).decode())
+        self.put(bytes(sample.payload).decode())
 
     def has(self, *items: Any) -> Callable[[], bool]:
         return lambda: self.items == list(items)
@@ -142,7 +142,7 @@ def test_a_message_arrives_with_key_attachment_and_joined_parts(network: Network
 
     (sample,) = inbox.items  # read long after the sink returned
     assert (sample.key, sample.attachment) == (KEY, b"a" * 33)
-    payload = sample.read()
+    payload = sample.payload
     assert payload == b"\x00\x01abcdef"
     assert (payload.format, payload.readonly, payload.ndim) == ("B", True, 1)
 
@@ -151,7 +151,7 @@ def test_a_message_arrives_with_key_attachment_and_joined_parts(network: Network
 def test_an_empty_payload_without_attachment_arrives(network: Network, parts: list[bytes]) -> None:
     here, there = network.session(), network.session()
     inbox = network.inbox()
-    there.subscribe(KEY, lambda sample: inbox.put(bytes(sample.read()), sample.attachment), DEFAULT)
+    there.subscribe(KEY, lambda sample: inbox.put(bytes(sample.payload), sample.attachment), DEFAULT)
     know(network, here, there)
 
     here.publish(KEY, DEFAULT).put(parts, None)
@@ -193,7 +193,7 @@ def test_a_large_payload_arrives_unchanged(network: Network) -> None:
         image = generator.integers(0, 256, 6 * 2**20, dtype=np.uint8)
         publisher.put([b"header", memoryview(image), bytearray(b"trailer")], None)
         network.wait(lambda number=number: len(inbox.items) == number + 1)
-        assert inbox.items[number].read() == b"header" + image.tobytes() + b"trailer"
+        assert inbox.items[number].payload == b"header" + image.tobytes() + b"trailer"
         inbox.items[number] = None
 
 
@@ -208,13 +208,13 @@ def test_a_reader_that_keeps_its_samples_stops_no_publisher(network: Network) ->
     for number, payload in enumerate(sent):
         publisher.put([payload], None)
         network.wait(lambda number=number: len(inbox.items) == number + 1)
-    assert [sample.read() for sample in inbox.items] == sent
+    assert [sample.payload for sample in inbox.items] == sent
 
 
 def test_a_wildcard_subscription_gets_every_matching_key(network: Network) -> None:
     here, there = network.session(), network.session()
     inbox = network.inbox()
-    there.subscribe("0/*/type/**", lambda sample: inbox.put(sample.key, bytes(sample.read())), DEFAULT)
+    there.subscribe("0/*/type/**", lambda sample: inbox.put(sample.key, bytes(sample.payload)), DEFAULT)
     know(network, here, there)
 
     for key in ("0/a/type/hash", "1/a/type/hash", "0/a/b/type/hash", "0/b/type"):
