@@ -73,7 +73,7 @@ def small_profile(
 
     model = {
         "cores": {"count": of(cores, "1"), "clock": of(1, "GHz")},
-        "fabric": {"infrastructure_clock": of(1, "GHz"), "thread_clock": of(1, "GHz")},
+        "fabric": {"thread_clock": of(1, "GHz")},
         "executor": {
             "hardware_poll": of(hardware_poll_ns, "ns"),
             "software_poll": of(software_poll_ns, "ns"),
