@@ -267,6 +267,34 @@ def test_a_goal_is_taken_as_it_is_when_it_is_sent() -> None:
     assert [handle.goal.order for handle in case.handles] == [0]
 
 
+@pytest.mark.parametrize("goal_id", [b"", b"too short", bytes(17), "a" * 16, 16, None])
+def test_with_what_is_no_goal_id_nothing_of_the_call_is_sent(
+    goal_id: Any, caplog: pytest.LogCaptureFixture
+) -> None:
+    case = Asking(hardware=False)
+
+    def ask(_: object, context: SoftwareContext) -> None:
+        context.send_goal(case.client, case.client.goal(order=0))
+        context.cancel_goal(case.client, goal_id)
+
+    executor, tickets = Executor(case.board, 1, 0), Tickets(case.board)
+    executor.add_sw_callback("ask", SUB, tickets, ask)
+    executor.spin()
+    tickets.put(None)
+    case.board.environment.run(until=10**6)
+    assert executor.failures == {"ask": 1}
+    assert f"{goal_id!r} is no goal id. Give the 16 bytes that `send_goal` has returned." in caplog.text
+    assert not case.handles
+
+
+def test_in_hardware_what_is_no_goal_id_fails_the_callback(caplog: pytest.LogCaptureFixture) -> None:
+    case = Asking(hardware=True)
+    case.sent.append(b"too short")
+    assert case.run(-1) == []
+    assert case.executor.failures == {"ask": 1}
+    assert "b'too short' is no goal id" in caplog.text
+
+
 def test_with_a_goal_of_a_wrong_type_nothing_of_the_call_is_sent(caplog: pytest.LogCaptureFixture) -> None:
     case = Asking(hardware=False)
 
