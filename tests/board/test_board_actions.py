@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from small_board import Steps
 
     from reconros_zenoh.board.callback import HardwareThread
+    from reconros_zenoh.board.profile import Profile
     from reconros_zenoh.board.software import SoftwareContext
     from reconros_zenoh.rmw.action_client import ActionEvent
     from reconros_zenoh.rmw.action_server import GoalHandle
@@ -162,8 +163,8 @@ def test_goals_that_are_refused() -> None:
 class Asking:
     """A board with an action client, and a server on the desktop that refuses odd orders."""
 
-    def __init__(self, *, hardware: bool) -> None:
-        self.board = small_board(PROFILE, 2)
+    def __init__(self, *, hardware: bool, profile: Profile = PROFILE) -> None:
+        self.board = small_board(profile, 2)
         node = self.board.context.node("client")
         self.client = ActionClientSource(self.board, node, FIBONACCI, "fibonacci")
         self.executor, self.tickets = Executor(self.board, 1, 2), Tickets(self.board)
@@ -233,6 +234,17 @@ def test_what_becomes_of_goals_starts_the_clients_callback(hardware: bool) -> No
 def test_a_client_cancels_its_goal(hardware: bool) -> None:
     case = Asking(hardware=hardware)
     assert case.run(0, -1) == ["accepted", "canceling"]
+
+
+def test_goals_that_are_pushed_out_before_they_are_sent_are_told_as_unanswered() -> None:
+    profile = small_profile({"ask": (10, 10), "hear": (10, 10)}, dds_message_ns=1000)
+    case = Asking(hardware=False, profile=profile)
+    for _ in range(15):
+        case.tickets.put(0)
+    case.board.environment.run(until=10**6)
+    kinds = {event.goal_id: event.kind for event in case.events}
+    assert len(case.handles) == 11
+    assert [kinds[goal_id] for goal_id in case.sent] == ["accepted"] + ["unanswered"] * 4 + ["accepted"] * 10
 
 
 def test_old_feedback_makes_room_and_nothing_else_does() -> None:
