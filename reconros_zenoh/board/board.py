@@ -21,6 +21,7 @@ from reconros_zenoh.board.spans import Spans
 from reconros_zenoh.board.zycap import ZyCAP
 from reconros_zenoh.errors import UsageError
 from reconros_zenoh.gateway.filters import Pair, conflict
+from reconros_zenoh.ros.qos import QosProfile
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -28,7 +29,6 @@ if TYPE_CHECKING:
     from reconros_zenoh.board.profile import Profile
     from reconros_zenoh.clock.virtual import VirtualEnvironment
     from reconros_zenoh.rmw.node import Context, Node
-    from reconros_zenoh.ros.qos import QosProfile
     from reconros_zenoh.ros.types import MessageType
 
 
@@ -134,8 +134,10 @@ class Board:
             raise UsageError(f"{topic.key} has the type {topic.type.name}, not {message_type.name}.")
         return topic
 
-    def add_gateway(self, name: str, hmt: str, smt: str, message_type: MessageType) -> Gateway:
-        """Return a new gateway between the topics of these absolute names.
+    def add_gateway(
+        self, name: str, hmt: str, smt: str, message_type: MessageType, qos: QosProfile | None = None
+    ) -> Gateway:
+        """Return a new gateway between the topics of these absolute names; `qos` is for its ends on the SMT.
 
         Raise UsageError when one of them has a gateway already, or another type.
         """
@@ -146,7 +148,7 @@ class Board:
                 f"{taken} has a gateway on board {self.name!r} already: two would send messages round."
             )
         topic = self.hardware_topic(hmt, message_type)
-        gateway = Gateway(self, self.context.node(name), topic, smt)
+        gateway = Gateway(self, self.context.node(name), topic, smt, qos or QosProfile())
         self.gateways.append(gateway)
         return gateway
 

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from reconros_zenoh.board.hmt import HardwareTopic
     from reconros_zenoh.clock.activity import Awaitable
     from reconros_zenoh.rmw.node import Node
+    from reconros_zenoh.ros.qos import QosProfile
 
 
 class Gateway:
@@ -29,7 +30,7 @@ class Gateway:
     Section 3.
     """
 
-    def __init__(self, board: Board, node: Node, topic: HardwareTopic, smt: str) -> None:
+    def __init__(self, board: Board, node: Node, topic: HardwareTopic, smt: str, qos: QosProfile) -> None:
         model = board.profile.model
         if model is not None and model.gateway is None:
             raise UsageError(
@@ -42,14 +43,15 @@ class Gateway:
         self._cancel_ns = model.gateway.cancel.ns if model and model.gateway else 0
         self._woken = Signal()
         self._smt_last = False
-        self._writer = board.writer(node, topic.type, smt, in_place=True)
+        self._writer = board.writer(node, topic.type, smt, qos, in_place=True)
         self._smt = SubscriptionSource(
-            board, node, topic.type, smt, own=PublisherFilter(self._writer.gid), in_hardware=True
+            board, node, topic.type, smt, qos, own=PublisherFilter(self._writer.gid), in_hardware=True
         )
         self._hmt = Fifo(FifoPlan(), self._wake, PublisherFilter(self), cut_through=True)
         self.name = node.name
         self.pair = Pair(topic.key, self._writer.topic)
         self.type = topic.type.name
+        self.qos = qos
         self.to_hmt = 0
         self.to_smt = 0
         self.late = 0

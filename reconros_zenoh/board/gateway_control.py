@@ -11,6 +11,7 @@ from reconros_zenoh.board.control import VERSION, ask, gateways
 from reconros_zenoh.errors import UsageError
 from reconros_zenoh.ros.graph import EndpointToken, parse, tokens_expression
 from reconros_zenoh.ros.names import dds_type_name, resolve
+from reconros_zenoh.ros.qos import QosProfile
 
 if TYPE_CHECKING:
     from reconros_zenoh.board.board import Board
@@ -29,6 +30,7 @@ class _Wanted(BaseModel):
     hmt: str
     smt: str
     type: str
+    qos: dict[str, str | int] = {}
 
 
 class _Question(BaseModel):
@@ -76,14 +78,16 @@ class GatewayServer:
         wanted = question.add
         if wanted is not None:
             hmt, smt = (resolve(topic, "/", wanted.name) for topic in (wanted.hmt, wanted.smt))
-            self._board.add_gateway(wanted.name, hmt, smt, self._types.message(wanted.type))
+            message_type, qos = self._types.message(wanted.type), QosProfile.of_words(wanted.qos)
+            self._board.add_gateway(wanted.name, hmt, smt, message_type, qos)
 
 
-def ask_gateways(transport: Transport, board: str, add: dict[str, str] | None = None) -> list[dict[str, Any]]:
+def ask_gateways(transport: Transport, board: str, add: dict[str, Any] | None = None) -> list[dict[str, Any]]:
     """Return the gateways of the board of that name.
 
-    `add` is one to be declared first: its `name`, the absolute topic names `hmt` and `smt`, and its `type`
-    (`sensor_msgs/msg/Image`). Raise UsageError when the board refuses it.
+    `add` is one to be declared first: its `name`, the absolute topic names `hmt` and `smt`, its `type`
+    (`sensor_msgs/msg/Image`), and its `qos` in words (`QosProfile.of_words`). Raise UsageError when the board
+    refuses it.
     """
     question = {"version": VERSION, **({"add": add} if add is not None else {})}
     answer = ask(transport, board, "gateway", msgpack.packb(question))

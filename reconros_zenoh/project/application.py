@@ -262,7 +262,9 @@ class Application:
         configuration = self.project.configuration
         for gateway in configuration.gateways:
             pair = gateway_pair(configuration.path, gateway)
-            self.board.add_gateway(gateway.name, pair.hmt, pair.smt, self.types.message(gateway.type))
+            self.board.add_gateway(
+                gateway.name, pair.hmt, pair.smt, self.types.message(gateway.type), gateway.qos
+            )
         self.executor.spin()
 
     def close(self) -> None:

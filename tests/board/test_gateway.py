@@ -18,6 +18,8 @@ from reconros_zenoh.board.profile import Profile, read_profile
 from reconros_zenoh.board.spans import Timeline
 from reconros_zenoh.clock.virtual import VirtualEnvironment
 from reconros_zenoh.errors import UsageError
+from reconros_zenoh.ros.graph import EndpointKind, EndpointToken, parse, tokens_expression
+from reconros_zenoh.ros.qos import Durability, QosProfile, Reliability
 from reconros_zenoh.transport.simulated import SimulatedNetwork
 
 if TYPE_CHECKING:
@@ -57,7 +59,7 @@ def modelled(**options: Any) -> Profile:
 class Side:
     """A board with a gateway between /a in hardware and /a in software, and who heard what when on it."""
 
-    def __init__(self, board: Board, subscribers: int = 2) -> None:
+    def __init__(self, board: Board, subscribers: int = 2, qos: QosProfile | None = None) -> None:
         self.board = board
         self.environment = board.environment
         self.node = board.context.node("n")
@@ -69,7 +71,7 @@ class Side:
         source = SubscriptionSource(board, self.node, words, "/a")
         source.open(lambda: self.software.append((self.environment.now, source.take().message)), None)
         self.writer = board.writer(self.node, words, "/a")
-        self.gateway = board.add_gateway("bridge", "/a", "/a", words)
+        self.gateway = board.add_gateway("bridge", "/a", "/a", words, qos)
 
     def _listen(self, heard: list[tuple[int, Any]]) -> None:
         def note() -> None:
@@ -196,6 +198,30 @@ def test_a_second_gateway_on_a_topic_is_refused_and_so_is_another_type() -> None
     assert side.numbers() == [[1], [1], [1]]
 
 
+def test_its_ends_have_its_qos() -> None:
+    board = small_board(modelled())
+    qos = QosProfile(Reliability.BEST_EFFORT, Durability.TRANSIENT_LOCAL, depth=3)
+    board.add_gateway("bridge", "/a", "/a", words, qos)
+    seen = [parse(key) for key in desktop(board).transport.tokens(tokens_expression(0), 0)]
+    ends = {token.kind: token.qos for token in seen if isinstance(token, EndpointToken)}
+    assert ends == {EndpointKind.PUBLISHER: qos, EndpointKind.SUBSCRIPTION: qos}
+
+
+def test_with_a_short_queue_it_keeps_the_newest() -> None:
+    side = Side(small_board(modelled()), qos=QosProfile(depth=1))
+    nobody_takes = Fifo(FifoPlan(depth=1), lambda: None, None, cut_through=False)
+    side.topic.subscribe(nobody_takes)
+    for number in range(5):
+        side.publish_in_software(message(number))
+    side.environment.run()
+    # 0 fills the FIFO, the core waits with 1; 4 has pushed 2 and 3 out.
+    assert side.gateway.dropped == 2
+    for _ in range(3):
+        nobody_takes.take()
+        side.environment.run()
+    assert side.numbers() == [[0, 1, 4], [0, 1, 4], [0, 1, 2, 3, 4]]
+
+
 def test_a_profile_must_know_gateways() -> None:
     profile = modelled()
     assert profile.model is not None
@@ -227,6 +253,7 @@ def test_the_status_tells_what_passed() -> None:
             "hmt": "hmt/board0/a",
             "smt": "/a",
             "type": "std_msgs/msg/UInt8MultiArray",
+            "qos": QosProfile().words(),
             "to_hmt": 1,
             "to_smt": 1,
             "late": 1,

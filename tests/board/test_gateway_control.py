@@ -11,6 +11,7 @@ from small_board import desktop, small_board, small_profile, types
 from reconros_zenoh.board.control import VERSION, gateways
 from reconros_zenoh.board.gateway_control import GatewayServer, check_type
 from reconros_zenoh.errors import UsageError
+from reconros_zenoh.ros.qos import QosProfile
 
 ADD = {"name": "bridge", "hmt": "/a", "smt": "/a", "type": "std_msgs/msg/UInt32"}
 
@@ -47,6 +48,12 @@ def test_a_gateway_is_added_and_listed() -> None:
     assert running.ask(request()) == answer
 
 
+def test_a_gateway_is_added_with_its_qos() -> None:
+    running = Running()
+    (added,) = running.ask(request(**ADD, qos={"reliability": "best_effort", "depth": 1}))["gateways"]
+    assert added["qos"] == {**QosProfile().words(), "reliability": "best_effort", "depth": 1}
+
+
 @pytest.mark.parametrize(
     ("question", "words"),
     [
@@ -62,6 +69,10 @@ def test_a_gateway_is_added_and_listed() -> None:
         (request(**{**ADD, "hmt": "/b", "smt": "b c"}), "'b c' contains ' '"),
         (request(**{**ADD, "hmt": "/b", "smt": "/b", "name": "a b"}), "The node name 'a b'"),
         (request(name="x"), "no request: Field required"),
+        (request(**{**ADD, "hmt": "/b", "smt": "/b", "qos": {"depth": 0}}), "depth is 0. Write a number"),
+        (request(**{**ADD, "hmt": "/b", "smt": "/b", "qos": {"speed": 1}}), "no QoS policy 'speed'"),
+        (request(**{**ADD, "hmt": "/b", "smt": "/b", "qos": {"depth": 1.5}}), "no request: Input should"),
+        (request(**{**ADD, "hmt": "/b", "smt": "/b", "qos": 5}), "no request: Input should be a valid dict"),
         *(
             (request(**{**ADD, "hmt": "/b", "smt": "/b", key: 5}), "no request: Input should be a valid str")
             for key in ADD
