@@ -40,7 +40,8 @@ _ANY_CLOCK_HZ = 1e9
 class SlotPlan:
     """A slot as the project declares it, with the resources of its regions.
 
-    Without `clock_hz` it has the profile's clock for hardware threads.
+    Without `clock_hz` it has the profile's clock for hardware threads. One that is not `reconfigurable`
+    always holds the one hardware thread that is mapped to it.
     """
 
     slot_id: int
@@ -48,6 +49,7 @@ class SlotPlan:
     dsp: int
     bram36: int
     clock_hz: int | None = None
+    reconfigurable: bool = True
 
 
 class Board:
@@ -99,6 +101,7 @@ class Board:
                 plan.slot_id,
                 profile.bitstream_size(plan.lut, plan.dsp, plan.bram36),
                 plan.clock_hz or (model.fabric.thread_clock.hz if model else _ANY_CLOCK_HZ),
+                plan.reconfigurable,
             )
             for plan in slots
         }

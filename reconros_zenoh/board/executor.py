@@ -136,13 +136,18 @@ class Executor:
         timing: Timing | None = None,
         limit_ms: float | None = None,
     ) -> None:
-        """Let the callback `name` run in these slots; the rest is as in `add_sw_callback`."""
+        """Let the callback `name` run in these slots; the rest is as in `add_sw_callback`.
+
+        One that is not reconfigurable holds it from the start, and no other callback can be added to it.
+        """
         _check_function(name, thread)
         served = {slot.slot_id for slot in self._slots}
         for slot in slots:
             if slot not in served:
                 raise UsageError(f"callback {name!r} needs slot {slot}, which no hardware worker serves.")
             time = hardware_time(self.board.profile, name, timing, self.board.slots[slot].clock_hz)
+            if not self.board.slots[slot].reconfigurable:
+                self.board.slots[slot].hold(name)
             self._register(name, kind, source, check).slots[slot] = (
                 thread,
                 time,
@@ -159,11 +164,12 @@ class Executor:
             (slot, name): Bitstream(slot, name, board.slots[slot].bitstream_size)
             for name, registration in self._registrations.items()
             for slot in registration.slots
+            if board.slots[slot].reconfigurable
         }
         board.zycap.init(read_bitstreams(self._bitstreams, wanted.values()) if self._bitstreams else wanted)
         for name, registration in self._registrations.items():
             slots = {
-                slot: HardwareImplementation(board.zycap.bitstream(slot, name), *implementation)
+                slot: HardwareImplementation(self._bitstream(slot, name), *implementation)
                 for slot, implementation in registration.slots.items()
             }
             entry = CallbackEntry(
@@ -253,6 +259,11 @@ class Executor:
         if registration.source is not source:
             raise UsageError(f"callback {name!r} is registered already with another source.")
         return registration
+
+    def _bitstream(self, slot_id: int, name: str) -> Bitstream:
+        """Return what is in the slot when the callback can run there."""
+        slot = self.board.slots[slot_id]
+        return self.board.zycap.bitstream(slot_id, name) if slot.reconfigurable else slot.hold(name)
 
     def _became_ready(self, entry: CallbackEntry) -> None:
         self._policy.refresh(entry)

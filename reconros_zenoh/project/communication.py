@@ -65,7 +65,21 @@ def check_topics(configuration: BuildConfiguration) -> None:
 
 
 def check_places(configuration: BuildConfiguration, callbacks: Mapping[str, CallbackMapping]) -> None:
-    """Raise FileError at the line of a hardware-mapped end whose callback may run in software."""
+    """Raise FileError at the line of what cannot be where it would be.
+
+    That is a hardware-mapped end whose callback may run in software, a slot that is not reconfigurable and
+    would have to hold two callbacks, and a gateway in a slot of a callback.
+    """
+    for slot in configuration.slots:
+        tenants = [name for name, callback in callbacks.items() if slot.id in callback.slots]
+        if len(tenants) > 1 and not slot.reconfigurable:
+            raise FileError(
+                configuration.path,
+                slot.line,
+                f"{slot.name} (Id {slot.id}) is not reconfigurable, but {' and '.join(tenants)} are mapped "
+                "to it.",
+                "Map one callback to it, or write `Reconfigurable = true`.",
+            )
     for thread in configuration.threads:
         for resource in configuration.resources:
             if (

@@ -45,34 +45,38 @@ class Mapping(BaseModel):
 
     @classmethod
     def default(cls, configuration: BuildConfiguration) -> Self:
-        """Return the mapping of a project without mapping files: what can be in hardware is, all else not."""
-        slots = bitstream_slots(configuration)
+        """Return the mapping of a project without mapping files: what can be in hardware is, all else not.
+
+        A callback gets all reconfigurable slots that it is built for; without any, the first other slot that
+        no callback before it has.
+        """
+        reconfigurable = {slot.id for slot in configuration.slots if slot.reconfigurable}
+        taken: set[int] = set()
+        callbacks: dict[str, CallbackMapping] = {}
+        for name, slots in built_for(configuration).items():
+            own = tuple(slot for slot in slots if slot in reconfigurable)
+            own = own or tuple(slot for slot in slots if slot not in taken)[:1]
+            taken.update(set(own) - reconfigurable)
+            callbacks[name] = CallbackMapping(software=not own, slots=own)
         return cls(
             name="default",
             executor="reconros",
             software_workers=2,
-            hardware_workers=sum(slot.reconfigurable for slot in configuration.slots),
-            callbacks={
-                name: CallbackMapping(software=not built_for, slots=built_for)
-                for name, built_for in slots.items()
-            },
+            hardware_workers=len(configuration.slots),
+            callbacks=callbacks,
         )
 
 
-def bitstream_slots(configuration: BuildConfiguration) -> dict[str, tuple[int, ...]]:
-    """Return the ids of the reconfigurable slots that each callback is built for."""
-    reconfigurable = {slot.id for slot in configuration.slots if slot.reconfigurable}
-    return {
-        thread.name: tuple(slot for slot in thread.slots if slot in reconfigurable and thread.hardware)
-        for thread in configuration.threads
-    }
+def built_for(configuration: BuildConfiguration) -> dict[str, tuple[int, ...]]:
+    """Return the ids of the slots that each callback is built for in hardware."""
+    return {thread.name: thread.slots if thread.hardware else () for thread in configuration.threads}
 
 
 def read_mapping(path: Path, callbacks: Map[str, Collection[int]], slots: Collection[int]) -> Mapping:
     """Return the mapping in a TOML file, checked against its project.
 
-    `callbacks` are the project's callbacks with the ids of the slots that they have bitstreams for, `slots`
-    the ids of all slots. `FileError` names the line of the first mistake. Each callback has to be mapped.
+    `callbacks` are the project's callbacks with the ids of the slots that they are built for, `slots` the ids
+    of all slots. `FileError` names the line of the first mistake. Each callback has to be mapped.
     """
     toml = TomlFile.read(path)
     if "name" in toml.content:
@@ -127,8 +131,8 @@ def _check_callback(
     if unbuilt:
         raise error(
             ["slots"],
-            f"The callback {name} is mapped to slot {unbuilt[0]}, for which its thread has no bitstream.",
-            f"It has bitstreams for: {', '.join(map(str, built_for)) or 'none'}; see HwSource and Slot of "
+            f"The callback {name} is mapped to slot {unbuilt[0]}, which its thread is not built for.",
+            f"It is built for: {', '.join(map(str, built_for)) or 'none'}; see HwSource and Slot of "
             f"[ReconosThread@{name}] in build.cfg.",
         )
     if callback.slots and mapping.executor == "standard":

@@ -146,6 +146,17 @@ def test_a_fifo_that_cannot_be_is_refused(tmp_path, end, words) -> None:
     assert refused.value.line == 9
 
 
+def test_a_slot_that_is_not_reconfigurable_holds_one_callback(tmp_path) -> None:
+    text = "[HwSlot@fixed(0:1)]\nId = 5\n"
+    read = configuration(tmp_path, text)
+    check_places(read, {"t": CallbackMapping(slots=(5, 0)), "u": CallbackMapping(slots=(6, 0))})
+    with pytest.raises(
+        FileError, match=r"fixed\(1\) \(Id 6\) is not reconfigurable, but t and u are mapped to it"
+    ) as refused:
+        check_places(read, {"t": CallbackMapping(slots=(6,)), "u": CallbackMapping(slots=(6, 0))})
+    assert refused.value.line == 9
+
+
 def test_a_gateway_shares_its_slot_with_no_callback(tmp_path) -> None:
     read = configuration(tmp_path, HW + THREAD + GATEWAY.format("g", "/a", "/a", "sensor_msgs/Image"))
     check_places(read, {"t": CallbackMapping(slots=(0,))})

@@ -65,6 +65,7 @@ def test_without_a_file_what_can_be_in_hardware_is(tmp_path: Path) -> None:
         "[ReconosThread@both]\nSlot = s(*), fixed(0)\nHwSource = hls\nSwSource = c\n"
         "[ReconosThread@soft]\nSlot = s(*)\nSwSource = c\n"
         "[ReconosThread@static]\nSlot = fixed(0)\nHwSource = hls\n"
+        "[ReconosThread@late]\nSlot = fixed(0)\nHwSource = hls\n"
         "[ReconosThread@nowhere]\nHwSource = hls\n",
         encoding="utf-8",
     )
@@ -72,11 +73,12 @@ def test_without_a_file_what_can_be_in_hardware_is(tmp_path: Path) -> None:
         name="default",
         executor="reconros",
         software_workers=2,
-        hardware_workers=2,
+        hardware_workers=3,
         callbacks={
             "both": CallbackMapping(slots=(4, 5)),
             "soft": CallbackMapping(software=True),
-            "static": CallbackMapping(software=True),
+            "static": CallbackMapping(slots=(9,)),
+            "late": CallbackMapping(software=True),
             "nowhere": CallbackMapping(software=True),
         },
     )
@@ -97,10 +99,10 @@ MISTAKES = {
     "slot that is no number": (GOOD.replace("[2, 3]", '["RS2"]'), 5, "valid integer"),
     "unknown callback": (GOOD.replace("sobel", "sobol"), 4, "'sobol'. Its callbacks: sobel, hash."),
     "unknown slot": (GOOD.replace("[2, 3]", "[2, 4]"), 5, "unknown slot 4. Known slots: 2, 3."),
-    "slot without a bitstream": (
+    "slot that it is not built for": (
         GOOD.replace("[3]", "[2, 3]"),
         9,
-        "slot 2, for which its thread has no bitstream. It has bitstreams for: 3;",
+        "slot 2, which its thread is not built for. It is built for: 3;",
     ),
     "no place": (GOOD.replace("slots = [2, 3]", "software = false"), 4, "no place"),
     "callback not mapped": (
