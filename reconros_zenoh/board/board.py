@@ -41,7 +41,7 @@ class SlotPlan:
     """A slot as the project declares it, with the resources of its regions.
 
     Without `clock_hz` it has the profile's clock for hardware threads. One that is not `reconfigurable`
-    always holds the one hardware thread that is mapped to it.
+    always holds the one hardware thread or gateway that is mapped to it.
     """
 
     slot_id: int
@@ -138,12 +138,27 @@ class Board:
         return topic
 
     def add_gateway(
-        self, name: str, hmt: str, smt: str, message_type: MessageType, qos: QosProfile | None = None
+        self,
+        name: str,
+        hmt: str,
+        smt: str,
+        message_type: MessageType,
+        slot_id: int,
+        qos: QosProfile | None = None,
+        *,
+        at_power_up: bool = True,
     ) -> Gateway:
         """Return a new gateway between the topics of these absolute names; `qos` is for its ends on the SMT.
 
-        Raise UsageError when one of them has a gateway already, or another type.
+        It has the slot for itself, which holds it since power-up, or else as soon as its bitstream is
+        written. Raise UsageError when one of the topics has a gateway already or another type, and for a slot
+        that is not free.
         """
+        if self.profile.model is not None and self.profile.model.gateway is None:
+            raise UsageError(
+                f"profile {self.profile.name!r} has no times for a gateway. Add a section [model.gateway] "
+                "to a copy of the profile, or use the profile zcu104 or native."
+            )
         pair = Pair(hmt_key(self.name, hmt), smt)
         taken = conflict(pair, [gateway.pair for gateway in self.gateways])
         if taken is not None:
@@ -151,7 +166,11 @@ class Board:
                 f"{taken} has a gateway on board {self.name!r} already: two would send messages round."
             )
         topic = self.hardware_topic(hmt, message_type)
-        gateway = Gateway(self, self.context.node(name), topic, smt, qos or QosProfile())
+        slot = self.slots[slot_id]
+        bitstream = slot.admit(name, alone=True)
+        if at_power_up:
+            slot.holds = bitstream
+        gateway = Gateway(self, self.context.node(name), topic, smt, qos or QosProfile(), slot, bitstream)
         self.gateways.append(gateway)
         return gateway
 

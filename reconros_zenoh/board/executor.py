@@ -138,7 +138,8 @@ class Executor:
     ) -> None:
         """Let the callback `name` run in these slots; the rest is as in `add_sw_callback`.
 
-        One that is not reconfigurable holds it from the start, and no other callback can be added to it.
+        One that is not reconfigurable holds it from the start, and no other callback can be added to it; none
+        can be added to one with a gateway.
         """
         _check_function(name, thread)
         served = {slot.slot_id for slot in self._slots}
@@ -146,8 +147,7 @@ class Executor:
             if slot not in served:
                 raise UsageError(f"callback {name!r} needs slot {slot}, which no hardware worker serves.")
             time = hardware_time(self.board.profile, name, timing, self.board.slots[slot].clock_hz)
-            if not self.board.slots[slot].reconfigurable:
-                self.board.slots[slot].hold(name)
+            self.board.slots[slot].admit(name)
             self._register(name, kind, source, check).slots[slot] = (
                 thread,
                 time,
@@ -263,7 +263,10 @@ class Executor:
     def _bitstream(self, slot_id: int, name: str) -> Bitstream:
         """Return what is in the slot when the callback can run there."""
         slot = self.board.slots[slot_id]
-        return self.board.zycap.bitstream(slot_id, name) if slot.reconfigurable else slot.hold(name)
+        if slot.reconfigurable:
+            return self.board.zycap.bitstream(slot_id, name)
+        assert slot.holds is not None  # it admitted the callback
+        return slot.holds
 
     def _became_ready(self, entry: CallbackEntry) -> None:
         self._policy.refresh(entry)

@@ -43,7 +43,10 @@ class _Question(BaseModel):
 
 
 class GatewayServer:
-    """Answers `reconros/<board>/gateway` with the gateways, after adding the one that the request has."""
+    """Answers `reconros/<board>/gateway` with the gateways, after adding the one that the request has.
+
+    It is loaded into the first reconfigurable slot that no callback may run in and no gateway has.
+    """
 
     def __init__(self, board: Board, types: TypeRegistry) -> None:
         self._board = board
@@ -79,7 +82,19 @@ class GatewayServer:
         if wanted is not None:
             hmt, smt = (resolve(topic, "/", wanted.name) for topic in (wanted.hmt, wanted.smt))
             message_type, qos = self._types.message(wanted.type), QosProfile.of_words(wanted.qos)
-            self._board.add_gateway(wanted.name, hmt, smt, message_type, qos)
+            self._board.add_gateway(
+                wanted.name, hmt, smt, message_type, self._free_slot(), qos, at_power_up=False
+            )
+
+    def _free_slot(self) -> int:
+        """Return the first slot that can be given to a gateway while the board runs."""
+        for slot_id, slot in sorted(self._board.slots.items()):
+            if slot.reconfigurable and not slot.tenants:
+                return slot_id
+        raise UsageError(
+            f"board {self._board.name!r} has no slot for a gateway: it has no reconfigurable slot without a "
+            "callback or a gateway. Add one to its build.cfg, or declare the gateway there."
+        )
 
 
 def ask_gateways(transport: Transport, board: str, add: dict[str, Any] | None = None) -> list[dict[str, Any]]:

@@ -10,9 +10,10 @@ from reconros_zenoh.errors import UsageError
 
 @dataclass(slots=True)
 class ReconfigurableSlot:
-    """A region of the FPGA that holds one hardware thread at a time (RS #x); empty at power-up.
+    """A region of the FPGA that holds one hardware thread or gateway at a time (RS #x); empty at power-up.
 
-    One that is not `reconfigurable` holds the same from power-up on.
+    `tenants` are the names of all that may be in it; one that must never be swapped out is there alone. A
+    slot that is not `reconfigurable` has one tenant and holds it from power-up on.
     """
 
     slot_id: int
@@ -20,19 +21,30 @@ class ReconfigurableSlot:
     clock_hz: float
     reconfigurable: bool = True
     holds: Bitstream | None = field(default=None, init=False)
+    tenants: set[str] = field(default_factory=set, init=False)
+    is_given_away: bool = field(default=False, init=False)
     reconfigurations: int = field(default=0, init=False)
     reconfiguration_ns: int = field(default=0, init=False)
     busy_ns: int = field(default=0, init=False)
 
-    def hold(self, name: str) -> Bitstream:
-        """Return what the slot holds since power-up: the hardware thread of this name.
+    def admit(self, name: str, *, alone: bool = False) -> Bitstream:
+        """Let this hardware thread or gateway be in the slot, and return the bitstream that brings it there.
 
-        Raise UsageError when it is another.
+        Raise UsageError when it, or who is there, must be `alone`, or the slot has its one tenant.
         """
-        if self.holds is not None and self.holds.callback != name:
+        if alone or self.is_given_away:
+            in_the_way = self.tenants
+        else:
+            in_the_way = set() if self.reconfigurable else self.tenants - {name}
+        if in_the_way:
+            kind = "" if self.reconfigurable else " and is not reconfigurable"
             raise UsageError(
-                f"{name!r} is mapped to slot {self.slot_id}, which is not reconfigurable and holds "
-                f"{self.holds.callback!r}. Map one of them elsewhere, or make the slot reconfigurable."
+                f"{name!r} cannot be in slot {self.slot_id}, which is for {', '.join(sorted(in_the_way))}"
+                f"{kind}. Give one of them another slot."
             )
-        self.holds = Bitstream(self.slot_id, name, self.bitstream_size)
-        return self.holds
+        self.tenants.add(name)
+        self.is_given_away = alone
+        bitstream = Bitstream(self.slot_id, name, self.bitstream_size)
+        if not self.reconfigurable:
+            self.holds = bitstream
+        return bitstream

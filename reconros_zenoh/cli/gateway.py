@@ -61,8 +61,8 @@ def gateway(
 ) -> None:
     """List the gateways of a board, or add one between a hardware-mapped and a software-mapped topic.
 
-    The QoS is that of its ends on the software-mapped topic. Exit status 2 when one of the topics has a
-    gateway already or another type.
+    The QoS is that of its ends on the software-mapped topic. The gateway is loaded into a free slot. Exit
+    status 2 when there is none, or one of the topics has a gateway already or another type.
     """
     from reconros_zenoh.board.gateway_control import ask_gateways, check_type
     from reconros_zenoh.project.type_names import inline_message_type
@@ -96,7 +96,7 @@ def gateway(
         print(json.dumps({"board": board, "gateways": found}))
         return
     for each in found:
-        print(f"{each['name']}: {each['hmt']} <-> {each['smt']} ({each['type']})")
+        print(f"{each['name']}: {each['hmt']} <-> {each['smt']} ({each['type']}), slot {each['slot']}")
         print("  " + ", ".join(f"{policy} {word}" for policy, word in each["qos"].items()))
         print("  " + ", ".join(f"{count} {each[count]}" for count in _COUNTS))
     if not found:

@@ -15,7 +15,7 @@ from reconros_zenoh.board.os_resources import Condition, Mailbox, Mutex, Semapho
 from reconros_zenoh.board.stack_node import StackNode
 from reconros_zenoh.errors import UsageError
 from reconros_zenoh.executor.callbacks import CallbackKind
-from reconros_zenoh.project.communication import gateway_pair, topic_name
+from reconros_zenoh.project.communication import gateway_pair, gateway_slots, topic_name
 from reconros_zenoh.rmw.parameters import Parameters
 
 if TYPE_CHECKING:
@@ -260,10 +260,12 @@ class Application:
         if self.executor is None:
             raise UsageError("app.spin() without a callback. Call app.register(...) first.")
         configuration = self.project.configuration
+        slots = gateway_slots(configuration, self.mapping.callbacks)
         for gateway in configuration.gateways:
             pair = gateway_pair(configuration.path, gateway)
+            message_type = self.types.message(gateway.type)
             self.board.add_gateway(
-                gateway.name, pair.hmt, pair.smt, self.types.message(gateway.type), gateway.qos
+                gateway.name, pair.hmt, pair.smt, message_type, slots[gateway.name], gateway.qos
             )
         self.executor.spin()
 

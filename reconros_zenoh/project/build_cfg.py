@@ -92,9 +92,10 @@ class ReconosThread:
 
 @dataclass(frozen=True)
 class RosGateway:
-    """A gateway between a hardware-mapped and a software-mapped topic, and the ids of the slots it sits in.
+    """A gateway between a hardware-mapped and a software-mapped topic.
 
-    `type` is the ROS 2 name of the message type, `qos` is that of both its ends on the software-mapped topic.
+    `slots` are the ids of the slots that it can be built for, `type` is the ROS 2 name of the message type,
+    `qos` that of both its ends on the software-mapped topic.
     """
 
     name: str

@@ -68,7 +68,7 @@ def check_places(configuration: BuildConfiguration, callbacks: Mapping[str, Call
     """Raise FileError at the line of what cannot be where it would be.
 
     That is a hardware-mapped end whose callback may run in software, a slot that is not reconfigurable and
-    would have to hold two callbacks, and a gateway in a slot of a callback.
+    would have to hold two callbacks, and a gateway without a slot of its own.
     """
     for slot in configuration.slots:
         tenants = [name for name, callback in callbacks.items() if slot.id in callback.slots]
@@ -94,15 +94,38 @@ def check_places(configuration: BuildConfiguration, callbacks: Mapping[str, Call
                     f"{_ENDS[resource.type]} of a hardware-mapped topic.",
                     "Map the callback to slots only, or the topic to software, with a gateway between.",
                 )
+    gateway_slots(configuration, callbacks)
+
+
+def gateway_slots(
+    configuration: BuildConfiguration, callbacks: Mapping[str, CallbackMapping]
+) -> dict[str, int]:
+    """Return the id of the slot that each gateway has for itself: one that no callback is mapped to.
+
+    Of the slots that a gateway can be built for it is the first, if possible one that no thread is built for.
+    Raise FileError at the line of a gateway that none is left for.
+    """
+    threads = {slot for thread in configuration.threads if thread.hardware for slot in thread.slots}
+    tenants = {slot: f"the callback {name}" for name, mapped in callbacks.items() for slot in mapped.slots}
+    slots: dict[str, int] = {}
     for gateway in configuration.gateways:
-        for name, callback in callbacks.items():
-            if set(gateway.slots) & set(callback.slots):
-                raise FileError(
-                    configuration.path,
-                    gateway.line,
-                    f"The gateway {gateway.name} sits in a slot that the callback {name} is mapped to.",
-                    "Give the gateway a slot of its own.",
-                )
+        free = [slot for slot in gateway.slots if slot not in tenants]
+        if not free:
+            others = dict.fromkeys(tenants[slot] for slot in gateway.slots)
+            raise FileError(
+                configuration.path,
+                gateway.line,
+                f"The gateway {gateway.name} has no slot for itself: "
+                + (
+                    f"its Slot names only those of {' and '.join(others)}."
+                    if others
+                    else "its Slot names none."
+                ),
+                "Name another one there.",
+            )
+        slots[gateway.name] = min(free, key=lambda slot: slot in threads)
+        tenants[slots[gateway.name]] = f"the gateway {gateway.name}"
+    return slots
 
 
 def _check_ends(configuration: BuildConfiguration, topic: str, ends: list[Resource]) -> None:

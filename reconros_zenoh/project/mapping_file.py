@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal, Self
 from pydantic import BaseModel, ConfigDict, Field, StrictBool, StrictInt, ValidationError
 
 from reconros_zenoh.errors import FileError
+from reconros_zenoh.project.communication import gateway_slots
 from reconros_zenoh.toml_file import TomlFile
 
 if TYPE_CHECKING:
@@ -48,13 +49,14 @@ class Mapping(BaseModel):
         """Return the mapping of a project without mapping files: what can be in hardware is, all else not.
 
         A callback gets all reconfigurable slots that it is built for; without any, the first other slot that
-        no callback before it has.
+        no callback before it has. A gateway's slot is the gateway's.
         """
         reconfigurable = {slot.id for slot in configuration.slots if slot.reconfigurable}
-        taken: set[int] = set()
+        gateways = set(gateway_slots(configuration, {}).values())
+        taken = set(gateways)
         callbacks: dict[str, CallbackMapping] = {}
         for name, slots in built_for(configuration).items():
-            own = tuple(slot for slot in slots if slot in reconfigurable)
+            own = tuple(slot for slot in slots if slot in reconfigurable - gateways)
             own = own or tuple(slot for slot in slots if slot not in taken)[:1]
             taken.update(set(own) - reconfigurable)
             callbacks[name] = CallbackMapping(software=not own, slots=own)

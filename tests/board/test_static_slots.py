@@ -65,7 +65,9 @@ def test_a_second_callback_is_refused() -> None:
     case = Board()
     source = Tickets(case.board)
     thread = logging_thread(case.log, "loaded")
-    with pytest.raises(UsageError, match="'loaded' is mapped to slot 0, which is not reconfigurable and"):
+    with pytest.raises(
+        UsageError, match="'loaded' cannot be in slot 0, which is for fixed and is not reconf"
+    ):
         case.executor.add_hw_callback("loaded", [0], CallbackKind.SUB, source, thread)
 
 
