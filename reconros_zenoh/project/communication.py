@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 _ENDS = {"rossub": "subscriber", "rospub": "publisher"}
 
 
-def topic_name(path: Path, resource: Resource) -> str:
-    """Return the absolute name of the topic that a rossub or rospub of the project file `path` belongs to.
+def endpoint_name(path: Path, resource: Resource) -> str:
+    """Return the absolute name of the topic, service or action of an end in the project file `path`.
 
     Raise FileError for a name that ROS 2 does not allow.
     """
@@ -33,7 +33,7 @@ def topic_name(path: Path, resource: Resource) -> str:
 
 
 def gateway_pair(path: Path, gateway: RosGateway) -> Pair:
-    """Return the absolute names of the topics of a gateway; raise FileError as `topic_name`."""
+    """Return the absolute names of the topics of a gateway; raise FileError as `endpoint_name`."""
     hmt, smt = (
         _resolved(path, gateway.line, topic, "/", gateway.name)
         for topic in (gateway.hw_topic, gateway.sw_topic)
@@ -47,8 +47,8 @@ def check_topics(configuration: BuildConfiguration) -> None:
     software: defaultdict[str, list[Resource]] = defaultdict(list)
     for resource in configuration.resources:
         if resource.type in _ENDS:
-            topic = topic_name(configuration.path, resource)
-            (hardware if resource.hardware_mapped else software)[topic].append(resource)
+            name = endpoint_name(configuration.path, resource)
+            (hardware if resource.hardware_mapped else software)[name].append(resource)
     pairs = _checked_gateways(configuration, hardware, software)
     bridged = {pair.hmt: pair.smt for pair in pairs}
     for topic, ends in hardware.items():

@@ -90,6 +90,7 @@ def read_mapping(path: Path, callbacks: Map[str, Collection[int]], slots: Collec
         )
     except ValidationError as error:
         raise _schema_error(toml, error) from None
+    _check_workers(toml, mapping, slots)
     for name in mapping.callbacks:
         if name not in callbacks:
             raise FileError(
@@ -108,6 +109,23 @@ def read_mapping(path: Path, callbacks: Map[str, Collection[int]], slots: Collec
             f"Add `[callbacks.{missing[0]}]` with `software = true` or `slots = [...]`.",
         )
     return mapping
+
+
+def _check_workers(toml: TomlFile, mapping: Mapping, slots: Collection[int]) -> None:
+    if mapping.hardware_workers > len(slots):
+        raise FileError(
+            toml.path,
+            toml.line(["hardware_workers"]),
+            f"There are {mapping.hardware_workers} hardware workers, but the project has {len(slots)} slots.",
+            "Give at most one for each slot.",
+        )
+    if mapping.hardware_workers and mapping.executor == "standard":
+        raise FileError(
+            toml.path,
+            toml.line(["hardware_workers"]),
+            "The standard executor has no hardware workers.",
+            'Use `executor = "reconros"` or take them away.',
+        )
 
 
 def _check_callback(
@@ -147,6 +165,15 @@ def _check_callback(
         raise error(
             ["slots"],
             f"The callback {name} is mapped to slots, but there are 0 hardware workers.",
+            "Raise `hardware_workers`.",
+        )
+    served = sorted(slots)[: mapping.hardware_workers]
+    unserved = [slot for slot in callback.slots if slot not in served]
+    if unserved:
+        raise error(
+            ["slots"],
+            f"The callback {name} is mapped to slot {unserved[0]}, which no hardware worker serves; "
+            f"they serve {', '.join(map(str, served))}.",
             "Raise `hardware_workers`.",
         )
     if callback.software and mapping.software_workers == 0:

@@ -46,7 +46,8 @@ def test_a_mapping(tmp_path: Path) -> None:
 
 
 def test_hardware_workers(tmp_path: Path) -> None:
-    assert read(tmp_path, "hardware_workers = 1\n" + GOOD).hardware_workers == 1
+    one_slot = GOOD.replace("slots = [2, 3]", "slots = [2]").replace("slots = [3]\n", "")
+    assert read(tmp_path, "hardware_workers = 1\n" + one_slot).hardware_workers == 1
 
 
 def test_the_standard_executor_has_no_hardware_workers(tmp_path: Path) -> None:
@@ -112,6 +113,21 @@ MISTAKES = {
     ),
     "hardware under the standard executor": (GOOD.replace("reconros", "standard"), 5, "knows only software"),
     "no software workers": (GOOD.replace("= 2", "= 0"), 8, "0 software workers"),
+    "more hardware workers than slots": (
+        "hardware_workers = 3\n" + GOOD,
+        1,
+        "3 hardware workers, but the project has 2 slots",
+    ),
+    "hardware workers under the standard executor": (
+        'hardware_workers = 1\nexecutor = "standard"\n' + GOOD.split("\n", 1)[1],
+        1,
+        "standard executor has no hardware workers",
+    ),
+    "slot that no worker serves": (
+        "hardware_workers = 1\n" + GOOD,
+        6,
+        "sobel is mapped to slot 3, which no hardware worker serves; they serve 2.",
+    ),
     "no hardware workers": ("hardware_workers = 0\n" + GOOD, 6, "0 hardware workers"),
 }
 
