@@ -92,6 +92,7 @@ class Executor:
         self._bitstreams = bitstreams
         self._policy = StandardExecutor() if kind == "standard" else ReconrosExecutor()
         self._registrations: dict[str, _Registration] = {}
+        self._is_spinning = False
         self._workers_of: dict[str, list[Worker]] = {}
         model = board.profile.model
         self._poll_jitter = model.executor.poll_jitter.share if model else 0.0
@@ -158,7 +159,10 @@ class Executor:
         """Load the bitstreams, open every source and start the workers.
 
         Deviation: it returns at once, because the event loop belongs to the board and may host several.
+        Raises UsageError the second time.
         """
+        if self._is_spinning:
+            raise UsageError("the executor spins already. Call spin() once, when all callbacks are added.")
         board = self.board
         wanted = {
             (slot, name): Bitstream(slot, name, board.slots[slot].bitstream_size)
@@ -167,6 +171,7 @@ class Executor:
             if board.slots[slot].reconfigurable
         }
         board.zycap.init(read_bitstreams(self._bitstreams, wanted.values()) if self._bitstreams else wanted)
+        self._is_spinning = True
         for name, registration in self._registrations.items():
             slots = {
                 slot: HardwareImplementation(self._bitstream(slot, name), *implementation)
@@ -255,6 +260,10 @@ class Executor:
     def _register(
         self, name: str, kind: CallbackKind, source: Source, check: Callable[[Any], None] | None
     ) -> _Registration:
+        if self._is_spinning:
+            raise UsageError(
+                f"callback {name!r} is added to an executor that spins already. Call spin() last."
+            )
         registration = self._registrations.setdefault(name, _Registration(kind, source, check))
         if registration.source is not source:
             raise UsageError(f"callback {name!r} is registered already with another source.")

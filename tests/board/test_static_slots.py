@@ -11,6 +11,7 @@ from reconros_zenoh import VirtualProject
 from reconros_zenoh.board.bitstream import Bitstream
 from reconros_zenoh.board.executor import Executor
 from reconros_zenoh.board.profile import read_profile
+from reconros_zenoh.cli.build import build
 from reconros_zenoh.errors import BitstreamError, UsageError
 from reconros_zenoh.executor.callbacks import CallbackKind
 from reconros_zenoh.project.loader import load_project
@@ -78,7 +79,9 @@ def test_it_needs_no_bitstream_file(tmp_path: Path) -> None:
     Board(tmp_path).executor.spin()
 
 
-def test_a_project_without_reconfigurable_slots_runs_in_hardware(tmp_path: Path) -> None:
+def test_a_project_without_reconfigurable_slots_runs_in_hardware(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     folder = tmp_path / "blink"
     new_project(folder)
     for mapping in (folder / "mappings").iterdir():
@@ -92,3 +95,5 @@ def test_a_project_without_reconfigurable_slots_runs_in_hardware(tmp_path: Path)
     count = blink.status()["callbacks"]["count"]
     assert (count["slots"], count["software"], count["calls"]) == ([0], False, 10)
     assert load_project(folder).bitstreams(read_profile("native")) == []
+    build(folder)
+    assert "no callback that is built for a reconfigurable slot" in capsys.readouterr().out

@@ -81,6 +81,20 @@ MISTAKES = {
     ),
     "no hardware": ("main.py", ", hardware=count.hardware", "", "main.py:8", "mapped to hardware, but no"),
     "no spin": ("main.py", "    app.spin()\n", "", "main.py", "does not call app.spin()"),
+    "callback after spin": (
+        "main.py",
+        "    app.spin()\n",
+        f"    app.spin()\n{REGISTER}",
+        "main.py:10",
+        "'count' is added to an executor that spins already",
+    ),
+    "second spin": (
+        "main.py",
+        "    app.spin()\n",
+        "    app.spin()\n    app.spin()\n",
+        "main.py:10",
+        "the executor spins already",
+    ),
     "spin without a callback": ("main.py", REGISTER, "", "main.py:8", "without a callback"),
     "callback that is not in build.cfg": (
         "main.py",
