@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, cast
 from reconros_zenoh.board.endpoints import Event
 from reconros_zenoh.board.spans import Timeline
 from reconros_zenoh.board.stack_node import StackNode
-from reconros_zenoh.errors import BadMessageError
+from reconros_zenoh.errors import BadMessageError, UsageError
 from reconros_zenoh.rmw.action_client import ActionClient
 from reconros_zenoh.rmw.action_server import ActionServer
 from reconros_zenoh.ros.message_arrays import snapshot
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from reconros_zenoh.transport.base import Parts
 
 _DEPTH = 10
+_ID_BYTES = 16
 
 
 class ActionSource:
@@ -138,13 +139,24 @@ class ActionClientSource:
         self._type.goal.encode(goal, joined_at_once=True)
         return snapshot(goal)
 
+    def checked_id(self, goal_id: bytes) -> bytes:
+        """Return the id of a goal, which cannot change any more; callable from any thread.
+
+        Raises UsageError for what is no goal id.
+        """
+        if not isinstance(goal_id, bytes | bytearray | memoryview) or len(goal_id) != _ID_BYTES:
+            raise UsageError(
+                f"{goal_id!r} is no goal id. Give the {_ID_BYTES} bytes that `send_goal` has returned."
+            )
+        return bytes(goal_id)
+
     def send_goal(self, goal: object, goal_id: bytes) -> None:
         """Send a goal; called by the event loop. Raises UsageError when it is not of the action's type."""
         self._client.send_goal(goal, goal_id)
 
     def cancel_goal(self, goal_id: bytes) -> None:
-        """Ask for a goal to end early; called by the event loop."""
-        self._client.cancel(goal_id)
+        """Ask for a goal to end early; called by the event loop. Raises UsageError for what is no goal id."""
+        self._client.cancel(self.checked_id(goal_id))
 
     def is_ready(self) -> bool:
         """Tell whether something has happened."""

@@ -16,11 +16,12 @@ from reconros_zenoh.board.host import IN_LINE_NS, Host
 from reconros_zenoh.board.local_topics import LocalTopics, LocalTopicWriter
 from reconros_zenoh.board.memif import Memif
 from reconros_zenoh.board.osif import Osif
-from reconros_zenoh.board.slots import ReconfigurableSlot
+from reconros_zenoh.board.slots import Slot
 from reconros_zenoh.board.spans import Spans
 from reconros_zenoh.board.zycap import ZyCAP
 from reconros_zenoh.errors import UsageError
 from reconros_zenoh.gateway.filters import Pair, conflict
+from reconros_zenoh.ros.qos import QosProfile
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -28,7 +29,6 @@ if TYPE_CHECKING:
     from reconros_zenoh.board.profile import Profile
     from reconros_zenoh.clock.virtual import VirtualEnvironment
     from reconros_zenoh.rmw.node import Context, Node
-    from reconros_zenoh.ros.qos import QosProfile
     from reconros_zenoh.ros.types import MessageType
 
 
@@ -40,7 +40,8 @@ _ANY_CLOCK_HZ = 1e9
 class SlotPlan:
     """A slot as the project declares it, with the resources of its regions.
 
-    Without `clock_hz` it has the profile's clock for hardware threads.
+    Without `clock_hz` it has the profile's clock for hardware threads. One that is not `reconfigurable`
+    always holds the one hardware thread or gateway that is mapped to it.
     """
 
     slot_id: int
@@ -48,6 +49,7 @@ class SlotPlan:
     dsp: int
     bram36: int
     clock_hz: int | None = None
+    reconfigurable: bool = True
 
 
 class Board:
@@ -94,11 +96,12 @@ class Board:
         self.hardware_topics: dict[str, HardwareTopic] = {}
         self.gateways: list[Gateway] = []
         self._tap = tap
-        self.slots: Mapping[int, ReconfigurableSlot] = {
-            plan.slot_id: ReconfigurableSlot(
+        self.slots: Mapping[int, Slot] = {
+            plan.slot_id: Slot(
                 plan.slot_id,
                 profile.bitstream_size(plan.lut, plan.dsp, plan.bram36),
                 plan.clock_hz or (model.fabric.thread_clock.hz if model else _ANY_CLOCK_HZ),
+                plan.reconfigurable,
             )
             for plan in slots
         }
@@ -134,11 +137,28 @@ class Board:
             raise UsageError(f"{topic.key} has the type {topic.type.name}, not {message_type.name}.")
         return topic
 
-    def add_gateway(self, name: str, hmt: str, smt: str, message_type: MessageType) -> Gateway:
-        """Return a new gateway between the topics of these absolute names.
+    def add_gateway(
+        self,
+        name: str,
+        hmt: str,
+        smt: str,
+        message_type: MessageType,
+        slot_id: int,
+        qos: QosProfile | None = None,
+        *,
+        at_power_up: bool = True,
+    ) -> Gateway:
+        """Return a new gateway between the topics of these absolute names; `qos` is for its ends on the SMT.
 
-        Raise UsageError when one of them has a gateway already, or another type.
+        It has the slot for itself, which holds it since power-up, or else as soon as its bitstream is
+        written. Raise UsageError when one of the topics has a gateway already or another type, and for a slot
+        that is not free.
         """
+        if self.profile.model is not None and self.profile.model.gateway is None:
+            raise UsageError(
+                f"profile {self.profile.name!r} has no times for a gateway. Add a section [model.gateway] "
+                "to a copy of the profile, or use the profile zcu104 or native."
+            )
         pair = Pair(hmt_key(self.name, hmt), smt)
         taken = conflict(pair, [gateway.pair for gateway in self.gateways])
         if taken is not None:
@@ -146,7 +166,11 @@ class Board:
                 f"{taken} has a gateway on board {self.name!r} already: two would send messages round."
             )
         topic = self.hardware_topic(hmt, message_type)
-        gateway = Gateway(self, self.context.node(name), topic, smt)
+        slot = self.slots[slot_id]
+        bitstream = slot.admit(name, alone=True)
+        if at_power_up:
+            slot.holds = bitstream
+        gateway = Gateway(self, self.context.node(name), topic, smt, qos or QosProfile(), slot, bitstream)
         self.gateways.append(gateway)
         return gateway
 

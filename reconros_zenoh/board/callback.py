@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from reconros_zenoh.board.clients import ClientSource
     from reconros_zenoh.board.endpoints import Event, MessageWriter
     from reconros_zenoh.board.host import Limit
-    from reconros_zenoh.board.slots import ReconfigurableSlot
+    from reconros_zenoh.board.slots import Slot
     from reconros_zenoh.board.timing import ExecutionTime
     from reconros_zenoh.clock.activity import Awaitable
     from reconros_zenoh.rmw.action_server import GoalHandle
@@ -136,7 +136,7 @@ class HardwareThread(DelegateCalls):
         self,
         board: Board,
         callback: str,
-        slot: ReconfigurableSlot,
+        slot: Slot,
         event: Event,
         implementation: HardwareImplementation,
     ) -> None:

@@ -8,30 +8,32 @@ from typing import TYPE_CHECKING, Any
 
 from reconros_zenoh.board.endpoints import Event, Reader, Writer
 from reconros_zenoh.board.spans import Timeline
-from reconros_zenoh.errors import BadMessageError
+from reconros_zenoh.errors import BadMessageError, TransportError
 from reconros_zenoh.rmw.received import Received
-from reconros_zenoh.ros.qos import QosProfile
+from reconros_zenoh.ros.qos import History, QosProfile
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from reconros_zenoh.board.board import Board
-    from reconros_zenoh.errors import TransportError
     from reconros_zenoh.rmw.node import Node
     from reconros_zenoh.ros.types import ServiceType
     from reconros_zenoh.transport.base import Parts
 
 _log = logging.getLogger(__name__)
 _ANSWER_NS = 10_000_000_000
+UNSENT = "newer calls pushed it out before it was sent, or it cannot be sent"
+"""Why a call that has not left the board has no answer."""
 
 
 class ClientSource(Reader):
     """A service client: callbacks call with it, and it is ready while a response waits.
 
-    The callback gets each response as its message, and None for a call that the server refused or did not
-    answer within `timeout_ns`: the first of them since the last response is logged, `unanswered` counts them.
-    Responses come in the order in which they arrive; each call has a `sequence_number`, which stands on the
-    wire as in ROS 2. Of calls that wait to be sent the last 10 are kept, of responses as well.
+    Every call ends in one event: its callback gets the response as its message, or None when the server
+    refused, did not answer within `timeout_ns`, or the call was not sent, because of calls that wait to be
+    sent the last 10 are kept. The first None since the last response is logged, `unanswered` counts them.
+    Responses come in the order in which they arrive and wait however long it takes; each call has a
+    `sequence_number`, which stands on the wire as in ROS 2.
     """
 
     def __init__(
@@ -42,7 +44,7 @@ class ClientSource(Reader):
         name: str,
         timeout_ns: int = _ANSWER_NS,
     ) -> None:
-        super().__init__(board, service_type.response, QosProfile())
+        super().__init__(board, service_type.response, QosProfile(history=History.KEEP_ALL))
         self._client = node.client(service_type, name)
         self._writer = Writer(board, QosProfile())
         self._timeout_ns = timeout_ns
@@ -52,7 +54,7 @@ class ClientSource(Reader):
 
     @property
     def dropped(self) -> int:
-        """How many calls and responses were pushed out by newer ones."""
+        """How many calls were pushed out by newer ones, or could not be sent."""
         return super().dropped + self._writer.dropped
 
     def open(self, on_ready: Callable[[], None], check: Callable[[Any], None] | None) -> None:
@@ -78,7 +80,8 @@ class ClientSource(Reader):
         call = partial(
             self._client.call_encoded, parts, on_response, self._timeout_ns, sequence_number=sequence_number
         )
-        self._writer.put(parts, timeline, call)
+        unsent = partial(on_response, TransportError(UNSENT))
+        self._writer.put(parts, timeline, call, unsent)
 
     def _on_response(
         self, sequence_number: int, response: Received | BadMessageError | TransportError

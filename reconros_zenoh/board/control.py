@@ -133,6 +133,8 @@ def gateways(board: Board) -> list[dict[str, Any]]:
             "hmt": gateway.pair.hmt,
             "smt": gateway.pair.smt,
             "type": gateway.type,
+            "qos": gateway.qos.words(),
+            "slot": gateway.slot_id,
             "to_hmt": gateway.to_hmt,
             "to_smt": gateway.to_smt,
             "late": gateway.late,

@@ -299,6 +299,7 @@ class _Outgoing(NamedTuple):
     send: Callable[[], None]
     size: int
     timeline: Timeline
+    on_dropped: Callable[[], object] = lambda: None
 
 
 class Writer:
@@ -309,16 +310,25 @@ class Writer:
 
     def __init__(self, board: Board, qos: QosProfile) -> None:
         self._board = board
-        self._stream: Stream[_Outgoing] = Stream(self._send, qos.queue_depth)
+        self._stream: Stream[_Outgoing] = Stream(self._send, qos.queue_depth, lambda lost: lost.on_dropped())
 
     @property
     def dropped(self) -> int:
         """How many messages were pushed out by newer ones."""
         return self._stream.dropped
 
-    def put(self, parts: Parts, timeline: Timeline, send: Callable[[], None]) -> None:
-        """Have `send` called when a message of these parts has gone through the stack and over the link."""
-        self._stream.put(_Outgoing(send, sum(map(len, parts)), timeline))
+    def put(
+        self,
+        parts: Parts,
+        timeline: Timeline,
+        send: Callable[[], None],
+        on_dropped: Callable[[], object] = lambda: None,
+    ) -> None:
+        """Have `send` called when a message of these parts has gone through the stack and over the link.
+
+        `on_dropped` is called instead, by the event loop, when it is pushed out or cannot be sent.
+        """
+        self._stream.put(_Outgoing(send, sum(map(len, parts)), timeline, on_dropped))
 
     def _send(self, outgoing: _Outgoing) -> Generator[Awaitable, object, None]:
         yield from self._board.dds.send(outgoing.size, outgoing.timeline)

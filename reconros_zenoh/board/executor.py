@@ -92,6 +92,7 @@ class Executor:
         self._bitstreams = bitstreams
         self._policy = StandardExecutor() if kind == "standard" else ReconrosExecutor()
         self._registrations: dict[str, _Registration] = {}
+        self._is_spinning = False
         self._workers_of: dict[str, list[Worker]] = {}
         model = board.profile.model
         self._poll_jitter = model.executor.poll_jitter.share if model else 0.0
@@ -138,13 +139,18 @@ class Executor:
         timing: Timing | None = None,
         limit_ms: float | None = None,
     ) -> None:
-        """Let the callback `name` run in these slots; the rest is as in `add_sw_callback`."""
+        """Let the callback `name` run in these slots; the rest is as in `add_sw_callback`.
+
+        One that is not reconfigurable holds it from the start, and no other callback can be added to it; none
+        can be added to one with a gateway.
+        """
         _check_function(name, thread)
         served = {slot.slot_id for slot in self._slots}
         for slot in slots:
             if slot not in served:
                 raise UsageError(f"callback {name!r} needs slot {slot}, which no hardware worker serves.")
             time = hardware_time(self.board.profile, name, timing, self.board.slots[slot].clock_hz)
+            self.board.slots[slot].admit(name)
             self._register(name, kind, source, check).slots[slot] = (
                 thread,
                 time,
@@ -155,17 +161,22 @@ class Executor:
         """Load the bitstreams, open every source and start the workers.
 
         Deviation: it returns at once, because the event loop belongs to the board and may host several.
+        Raises UsageError the second time.
         """
+        if self._is_spinning:
+            raise UsageError("the executor spins already. Call spin() once, when all callbacks are added.")
         board = self.board
         wanted = {
             (slot, name): Bitstream(slot, name, board.slots[slot].bitstream_size)
             for name, registration in self._registrations.items()
             for slot in registration.slots
+            if board.slots[slot].reconfigurable
         }
         board.zycap.init(read_bitstreams(self._bitstreams, wanted.values()) if self._bitstreams else wanted)
+        self._is_spinning = True
         for name, registration in self._registrations.items():
             slots = {
-                slot: HardwareImplementation(board.zycap.bitstream(slot, name), *implementation)
+                slot: HardwareImplementation(self._bitstream(slot, name), *implementation)
                 for slot, implementation in registration.slots.items()
             }
             entry = CallbackEntry(
@@ -245,10 +256,22 @@ class Executor:
     def _register(
         self, name: str, kind: CallbackKind, source: Source, check: Callable[[Any], None] | None
     ) -> _Registration:
+        if self._is_spinning:
+            raise UsageError(
+                f"callback {name!r} is added to an executor that spins already. Call spin() last."
+            )
         registration = self._registrations.setdefault(name, _Registration(kind, source, check))
         if registration.source is not source:
             raise UsageError(f"callback {name!r} is registered already with another source.")
         return registration
+
+    def _bitstream(self, slot_id: int, name: str) -> Bitstream:
+        """Return what is in the slot when the callback can run there."""
+        slot = self.board.slots[slot_id]
+        if slot.reconfigurable:
+            return self.board.zycap.bitstream(slot_id, name)
+        assert slot.holds is not None  # it admitted the callback
+        return slot.holds
 
     def _became_ready(self, entry: CallbackEntry) -> None:
         self._policy.refresh(entry)

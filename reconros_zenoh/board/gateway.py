@@ -7,56 +7,65 @@ from typing import TYPE_CHECKING
 from reconros_zenoh.board.endpoints import SubscriptionSource
 from reconros_zenoh.board.hmt import Fifo, FifoPlan
 from reconros_zenoh.clock.activity import Activity, Signal
-from reconros_zenoh.errors import BadMessageError, UsageError
+from reconros_zenoh.errors import BadMessageError
 from reconros_zenoh.gateway import core
 from reconros_zenoh.gateway.filters import Pair, PublisherFilter
 
 if TYPE_CHECKING:
     from collections.abc import Generator
 
+    from reconros_zenoh.board.bitstream import Bitstream
     from reconros_zenoh.board.board import Board
     from reconros_zenoh.board.endpoints import Event
     from reconros_zenoh.board.hmt import HardwareTopic
+    from reconros_zenoh.board.slots import Slot
     from reconros_zenoh.clock.activity import Awaitable
     from reconros_zenoh.rmw.node import Node
+    from reconros_zenoh.ros.qos import QosProfile
 
 
 class Gateway:
     """Keeps a software-mapped and a hardware-mapped topic of one name each alike, until it is closed.
 
     Whatever the number of subscribers, a message crosses the MEMIF once. Towards the HMT it is read from
-    memory and streamed at the same time; from the HMT it is written as its words come in. Source: Gateways,
-    Section 3.
+    memory and streamed at the same time; from the HMT it is written as its words come in. What comes before
+    the slot holds the gateway waits for it. Source: Gateways, Section 3.
     """
 
-    def __init__(self, board: Board, node: Node, topic: HardwareTopic, smt: str) -> None:
+    def __init__(
+        self,
+        board: Board,
+        node: Node,
+        topic: HardwareTopic,
+        smt: str,
+        qos: QosProfile,
+        slot: Slot,
+        bitstream: Bitstream,
+    ) -> None:
         model = board.profile.model
-        if model is not None and model.gateway is None:
-            raise UsageError(
-                f"profile {board.profile.name!r} has no times for a gateway. Add a section [model.gateway] "
-                "to a copy of the profile, or use the profile zcu104 or native."
-            )
         self._board = board
         self._node = node
         self._topic = topic
         self._cancel_ns = model.gateway.cancel.ns if model and model.gateway else 0
         self._woken = Signal()
         self._smt_last = False
-        self._writer = board.writer(node, topic.type, smt, in_place=True)
+        self._writer = board.writer(node, topic.type, smt, qos, in_place=True)
         self._smt = SubscriptionSource(
-            board, node, topic.type, smt, own=PublisherFilter(self._writer.gid), in_hardware=True
+            board, node, topic.type, smt, qos, own=PublisherFilter(self._writer.gid), in_hardware=True
         )
         self._hmt = Fifo(FifoPlan(), self._wake, PublisherFilter(self), cut_through=True)
         self.name = node.name
         self.pair = Pair(topic.key, self._writer.topic)
         self.type = topic.type.name
+        self.qos = qos
+        self.slot_id = slot.slot_id
         self.to_hmt = 0
         self.to_smt = 0
         self.late = 0
         self.refused = 0
         topic.subscribe(self._hmt)
         self._smt.open(self._wake, None)
-        Activity(self._run())
+        Activity(self._run(slot, bitstream))
 
     @property
     def dropped(self) -> int:
@@ -72,7 +81,8 @@ class Gateway:
         woken, self._woken = self._woken, Signal()
         woken.fire()
 
-    def _run(self) -> Generator[Awaitable, object, None]:
+    def _run(self, slot: Slot, bitstream: Bitstream) -> Generator[Awaitable, object, None]:
+        yield from self._board.zycap.write_bitstream(slot, bitstream)
         state, action = core.step(core.State(), core.Started())
         while True:
             event = yield from self._carry_out(action)

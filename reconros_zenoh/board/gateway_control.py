@@ -11,6 +11,7 @@ from reconros_zenoh.board.control import VERSION, ask, gateways
 from reconros_zenoh.errors import UsageError
 from reconros_zenoh.ros.graph import EndpointToken, parse, tokens_expression
 from reconros_zenoh.ros.names import dds_type_name, resolve
+from reconros_zenoh.ros.qos import QosProfile
 
 if TYPE_CHECKING:
     from reconros_zenoh.board.board import Board
@@ -29,6 +30,7 @@ class _Wanted(BaseModel):
     hmt: str
     smt: str
     type: str
+    qos: dict[str, str | int] = {}
 
 
 class _Question(BaseModel):
@@ -41,7 +43,10 @@ class _Question(BaseModel):
 
 
 class GatewayServer:
-    """Answers `reconros/<board>/gateway` with the gateways, after adding the one that the request has."""
+    """Answers `reconros/<board>/gateway` with the gateways, after adding the one that the request has.
+
+    It is loaded into the first reconfigurable slot that no callback may run in and no gateway has.
+    """
 
     def __init__(self, board: Board, types: TypeRegistry) -> None:
         self._board = board
@@ -76,14 +81,28 @@ class GatewayServer:
         wanted = question.add
         if wanted is not None:
             hmt, smt = (resolve(topic, "/", wanted.name) for topic in (wanted.hmt, wanted.smt))
-            self._board.add_gateway(wanted.name, hmt, smt, self._types.message(wanted.type))
+            message_type, qos = self._types.message(wanted.type), QosProfile.of_words(wanted.qos)
+            self._board.add_gateway(
+                wanted.name, hmt, smt, message_type, self._free_slot(), qos, at_power_up=False
+            )
+
+    def _free_slot(self) -> int:
+        """Return the first slot that can be given to a gateway while the board runs."""
+        for slot_id, slot in sorted(self._board.slots.items()):
+            if slot.reconfigurable and not slot.tenants:
+                return slot_id
+        raise UsageError(
+            f"board {self._board.name!r} has no slot for a gateway: it has no reconfigurable slot without a "
+            "callback or a gateway. Add one to its build.cfg, or declare the gateway there."
+        )
 
 
-def ask_gateways(transport: Transport, board: str, add: dict[str, str] | None = None) -> list[dict[str, Any]]:
+def ask_gateways(transport: Transport, board: str, add: dict[str, Any] | None = None) -> list[dict[str, Any]]:
     """Return the gateways of the board of that name.
 
-    `add` is one to be declared first: its `name`, the absolute topic names `hmt` and `smt`, and its `type`
-    (`sensor_msgs/msg/Image`). Raise UsageError when the board refuses it.
+    `add` is one to be declared first: its `name`, the absolute topic names `hmt` and `smt`, its `type`
+    (`sensor_msgs/msg/Image`), and its `qos` in words (`QosProfile.of_words`). Raise UsageError when the board
+    refuses it.
     """
     question = {"version": VERSION, **({"add": add} if add is not None else {})}
     answer = ask(transport, board, "gateway", msgpack.packb(question))

@@ -17,7 +17,7 @@ from reconros_zenoh.rmw.received import Received
 from reconros_zenoh.ros.graph import EndpointKind, EndpointToken, parse, tokens_expression
 from reconros_zenoh.ros.message_arrays import snapshot
 from reconros_zenoh.ros.names import data_key
-from reconros_zenoh.ros.qos import QosProfile
+from reconros_zenoh.ros.qos import Durability, QosProfile
 
 if TYPE_CHECKING:
     from collections.abc import Generator
@@ -126,7 +126,8 @@ class _Sent(NamedTuple):
 class LocalTopicWriter(TopicWriter):
     """A publisher of a board that knows what its own topics cost; stack and link only for readers elsewhere.
 
-    All readers get one copy of the message as it was when it was published; its arrays are read-only.
+    With TRANSIENT_LOCAL every message goes through them, because such a reader may come later. All
+    readers get one copy of the message as it was when it was published; its arrays are read-only.
     """
 
     def __init__(
@@ -144,6 +145,8 @@ class LocalTopicWriter(TopicWriter):
         super().__init__(board, node, message_type, topic, qos)
         self._topics = topics
         self._in_place = in_place
+        # The transport keeps what is sent for those who come late.
+        self._is_kept = qos.durability is Durability.TRANSIENT_LOCAL
         self._publications: Stream[_Sent] = Stream(self._publish_from_software, qos.queue_depth)
         topics.publishers.add(self.gid)
 
@@ -177,5 +180,5 @@ class LocalTopicWriter(TopicWriter):
         yield from self._topics.publish(
             self.key, received, sent.timeline, hardware=hardware, in_place=self._in_place
         )
-        if self._topics.is_read_elsewhere(self.key):
+        if self._is_kept or self._topics.is_read_elsewhere(self.key):
             super().send(sent.parts, sent.timeline)

@@ -44,9 +44,8 @@ class CoresSection(_Section):
 
 
 class FabricSection(_Section):
-    """The clocks of the reconfigurable part."""
+    """The reconfigurable part: the clock of hardware threads whose slot declares none."""
 
-    infrastructure_clock: Frequency
     thread_clock: Frequency
 
 

@@ -105,8 +105,12 @@ class SoftwareContext:
         return goal_id
 
     def cancel_goal(self, client: ActionClientSource, goal_id: bytes) -> None:
-        """Ask for a goal to end early, once the callback has run to completion."""
-        self.sends.append(lambda _: client.cancel_goal(goal_id))
+        """Ask for a goal to end early, once the callback has run to completion.
+
+        Raises UsageError for what is no goal id.
+        """
+        checked_id = client.checked_id(goal_id)
+        self.sends.append(lambda _: client.cancel_goal(checked_id))
 
     def mbox_tryget(self, mailbox: Mailbox) -> int | None:
         """Remove the oldest word and return it, or None."""

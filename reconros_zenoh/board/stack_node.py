@@ -6,9 +6,11 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from reconros_zenoh.board.clients import UNSENT
 from reconros_zenoh.board.endpoints import Writer
 from reconros_zenoh.board.spans import Timeline
 from reconros_zenoh.board.stream import Stream
+from reconros_zenoh.errors import TransportError
 from reconros_zenoh.rmw.received import Received
 from reconros_zenoh.ros.qos import QosProfile
 
@@ -17,7 +19,7 @@ if TYPE_CHECKING:
 
     from reconros_zenoh.board.board import Board
     from reconros_zenoh.clock.activity import Awaitable
-    from reconros_zenoh.errors import BadMessageError, TransportError
+    from reconros_zenoh.errors import BadMessageError
     from reconros_zenoh.rmw.client import Client
     from reconros_zenoh.rmw.node import Context, Node
     from reconros_zenoh.rmw.publisher import Publisher
@@ -165,7 +167,8 @@ class StackClient:
                 self._board.environment.post(on_response, received)
 
         send = partial(self._client.call_encoded, parts, on_received, timeout_ns)
-        self._board.environment.post(_put, self._board, self._writer, parts, send, self._label)
+        unsent = partial(on_received, TransportError(UNSENT))
+        self._board.environment.post(_put, self._board, self._writer, parts, send, self._label, unsent)
 
 
 @dataclass(frozen=True, slots=True)
@@ -185,7 +188,14 @@ class _StackResponder:
         self.responder.fail(text)
 
 
-def _put(board: Board, writer: Writer, parts: Parts, send: Callable[[], None], label: str) -> None:
+def _put(
+    board: Board,
+    writer: Writer,
+    parts: Parts,
+    send: Callable[[], None],
+    label: str,
+    on_dropped: Callable[[], object] = lambda: None,
+) -> None:
     timeline = Timeline(board.environment, board.environment.now)
     timeline.callback = label
-    writer.put(parts, timeline, send)
+    writer.put(parts, timeline, send, on_dropped)

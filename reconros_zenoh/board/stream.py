@@ -23,13 +23,17 @@ class Stream(Generic[T]):
 
     At most `depth` wait (None: any number); a further one pushes the oldest out (KEEP_LAST). `dropped` counts
     what was pushed out, and the items whose process raised: the first error of a type and place is logged,
-    and the stream goes on.
+    and the stream goes on. `on_dropped` gets each of them.
     """
 
     def __init__(
-        self, process: Callable[[T], Generator[Awaitable, object, object]], depth: int | None
+        self,
+        process: Callable[[T], Generator[Awaitable, object, object]],
+        depth: int | None,
+        on_dropped: Callable[[T], object] = lambda _: None,
     ) -> None:
         self._process = process
+        self._on_dropped = on_dropped
         self._waiting: deque[T] = deque(maxlen=depth)
         self.dropped = 0
         self._ways_to_fail = Failures()
@@ -38,20 +42,26 @@ class Stream(Generic[T]):
     def put(self, item: T) -> None:
         """Append an item."""
         if len(self._waiting) == self._waiting.maxlen:
-            self.dropped += 1
+            self._drop(self._waiting.popleft())
         self._waiting.append(item)
         self._activity.resume()
 
     def _run(self) -> Generator[Awaitable, object, None]:
         while True:
             while self._waiting:
+                item = self._waiting.popleft()
                 try:
-                    yield from self._process(self._waiting.popleft())
+                    yield from self._process(item)
                 except Exception as error:  # noqa: BLE001 - one message must not end the stream
-                    self.dropped += 1
+                    self._drop(item)
                     if self._ways_to_fail.is_new(error):
                         _log.exception(
                             "a message was lost on its way through the board; a loss of this kind is not "
                             "reported again"
                         )
+                del item  # the last one is not kept while the stream is idle
             yield PARK
+
+    def _drop(self, item: T) -> None:
+        self.dropped += 1
+        self._on_dropped(item)

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from reconros_zenoh.board.endpoints import Event
     from reconros_zenoh.board.executor import Executor
     from reconros_zenoh.board.host import Limit
-    from reconros_zenoh.board.slots import ReconfigurableSlot
+    from reconros_zenoh.board.slots import Slot
     from reconros_zenoh.board.software import SoftwareImplementation
     from reconros_zenoh.clock.activity import Awaitable
     from reconros_zenoh.executor.callbacks import Dispatch
@@ -132,7 +132,7 @@ class SoftwareWorker(Worker):
 class HardwareWorker(Worker):
     """Runs callbacks in one reconfigurable slot."""
 
-    def __init__(self, executor: Executor, slot: ReconfigurableSlot, poll_ns: int) -> None:
+    def __init__(self, executor: Executor, slot: Slot, poll_ns: int) -> None:
         super().__init__(executor, slot.slot_id, poll_ns)
         self._slot = slot
 

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from reconros_zenoh.board.bitstream import Bitstream
     from reconros_zenoh.board.cpu import Cpu
     from reconros_zenoh.board.profile import DdsSection, IcapSection
-    from reconros_zenoh.board.slots import ReconfigurableSlot
+    from reconros_zenoh.board.slots import Slot
     from reconros_zenoh.clock.activity import Awaitable
     from reconros_zenoh.clock.virtual import VirtualEnvironment
 
@@ -58,9 +58,7 @@ class ZyCAP:
             return 0
         return round(size / self._icap.bandwidth.bytes_per_ns) + self._icap.offset.ns
 
-    def write_bitstream(
-        self, slot: ReconfigurableSlot, bitstream: Bitstream
-    ) -> Generator[Awaitable, object, None]:
+    def write_bitstream(self, slot: Slot, bitstream: Bitstream) -> Generator[Awaitable, object, None]:
         """Return when the slot holds the bitstream; at once if and only if it does already."""
         if slot.holds == bitstream:
             return

@@ -23,7 +23,7 @@ def build(
     ] = "miniitx-zynq7100",
     as_json: AsJson = False,
 ) -> None:
-    """Write a partial bitstream for each callback and each slot it can be built for."""
+    """Write a partial bitstream for each callback and each reconfigurable slot it can be built for."""
     folder = out or project / "bitstreams"
     with project_prints(as_json=as_json):
         loaded = load_project(project)
@@ -43,3 +43,5 @@ def build(
         return
     for path, bitstream in zip(written, bitstreams, strict=True):
         print(f"{path}  {bitstream.size} bytes")
+    if not bitstreams:
+        print(f"{project} has no callback that is built for a reconfigurable slot: there is nothing to write")

@@ -170,7 +170,7 @@ def _print(console: Console, configuration: BuildConfiguration) -> None:
     _table(
         console,
         "gateways",
-        ("name", "slots", "hardware-mapped", "software-mapped", "type"),
+        ("name", "slots", "hardware-mapped", "software-mapped", "type", "QoS"),
         (
             (
                 gateway.name,
@@ -178,6 +178,7 @@ def _print(console: Console, configuration: BuildConfiguration) -> None:
                 gateway.hw_topic,
                 gateway.sw_topic,
                 gateway.type,
+                " ".join(map(str, gateway.qos.words().values())),
             )
             for gateway in configuration.gateways
         ),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -34,19 +34,45 @@ def gateway(
     name: Annotated[
         str | None, typer.Option(help="The name of its node.", show_default="after the topic")
     ] = None,
+    reliability: Annotated[
+        str | None,
+        typer.Option(
+            "--qos-reliability", metavar="WORD", help="reliable or best_effort.", show_default="reliable"
+        ),
+    ] = None,
+    durability: Annotated[
+        str | None,
+        typer.Option(
+            "--qos-durability", metavar="WORD", help="volatile or transient_local.", show_default="volatile"
+        ),
+    ] = None,
+    history: Annotated[
+        str | None,
+        typer.Option(
+            "--qos-history", metavar="WORD", help="keep_last or keep_all.", show_default="keep_last"
+        ),
+    ] = None,
+    depth: Annotated[
+        int | None, typer.Option("--qos-depth", help="How many messages a queue keeps.", show_default="10")
+    ] = None,
     router: Router = ENDPOINT,
     domain: Domain = 0,
     as_json: AsJson = False,
 ) -> None:
     """List the gateways of a board, or add one between a hardware-mapped and a software-mapped topic.
 
-    Exit status 2 when one of the topics has a gateway already or another type.
+    The QoS is that of its ends on the software-mapped topic. The gateway is loaded into a free slot. Exit
+    status 2 when there is none, or one of the topics has a gateway already or another type.
     """
     from reconros_zenoh.board.gateway_control import ask_gateways, check_type
     from reconros_zenoh.project.type_names import inline_message_type
     from reconros_zenoh.ros.names import resolve
+    from reconros_zenoh.ros.qos import QosProfile
 
-    add = None
+    policies = {"reliability": reliability, "durability": durability, "history": history, "depth": depth}
+    qos = {policy: word for policy, word in policies.items() if word is not None}
+    QosProfile.of_words(qos)
+    add: dict[str, Any] | None = None
     if hmt is not None:
         try:
             type_name = inline_message_type(message_type or "")
@@ -58,8 +84,9 @@ def gateway(
             "hmt": topic,
             "smt": resolve(smt or hmt, "/", "gateway"),
             "type": type_name,
+            "qos": qos,
         }
-    elif smt is not None or message_type is not None or name is not None:
+    elif smt is not None or message_type is not None or name is not None or qos:
         raise UsageError("a gateway needs its hardware-mapped topic. Add --hmt TOPIC.")
     with ZenohTransport.open(router) as transport:
         if add is not None:
@@ -69,7 +96,8 @@ def gateway(
         print(json.dumps({"board": board, "gateways": found}))
         return
     for each in found:
-        print(f"{each['name']}: {each['hmt']} <-> {each['smt']} ({each['type']})")
+        print(f"{each['name']}: {each['hmt']} <-> {each['smt']} ({each['type']}), slot {each['slot']}")
+        print("  " + ", ".join(f"{policy} {word}" for policy, word in each["qos"].items()))
         print("  " + ", ".join(f"{count} {each[count]}" for count in _COUNTS))
     if not found:
         print(f"board {board} has no gateway")

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     import simpy
 
     from reconros_zenoh.board.profile import Model, Profile
-    from reconros_zenoh.board.slots import ReconfigurableSlot
+    from reconros_zenoh.board.slots import Slot
     from reconros_zenoh.clock.activity import Awaitable
     from reconros_zenoh.experiments.roundtrip import Clock
 
@@ -139,9 +139,7 @@ def measure_reconfiguration(
     }
 
 
-def _write(
-    board: Board, slot: ReconfigurableSlot, writes: int, done: simpy.Event
-) -> Generator[Awaitable, object, None]:
+def _write(board: Board, slot: Slot, writes: int, done: simpy.Event) -> Generator[Awaitable, object, None]:
     """Write two bitstreams in turn; `done` happens with how long each write took [ms]."""
     # The loop may have to catch up with what came before.
     yield board.environment.timeout(_SETTLE_NS)
@@ -155,7 +153,7 @@ def _write(
 
 
 def _row(
-    slot: ReconfigurableSlot, resources: SlotResources, times_ms: np.ndarray[Any, Any], model: Model
+    slot: Slot, resources: SlotResources, times_ms: np.ndarray[Any, Any], model: Model
 ) -> dict[str, Any]:
     printed = TABLE_II[slot.slot_id]
     mean_ms = float(times_ms.mean())

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 from reconros_zenoh.mapping.graph import ComputationGraph, Side, Topic
-from reconros_zenoh.project.communication import gateway_pair, topic_name
+from reconros_zenoh.project.communication import endpoint_name, gateway_pair
 
 if TYPE_CHECKING:
     from reconros_zenoh.project.build_cfg import BuildConfiguration, ReconosThread
@@ -48,7 +48,7 @@ def topic_ends(configuration: BuildConfiguration, mapping: Mapping | None = None
         if resource.type not in {"rossub", "rospub"}:
             continue
         assert resource.node is not None
-        topic = topic_name(configuration.path, resource)
+        topic = endpoint_name(configuration.path, resource)
         if resource.hardware_mapped:
             topic = gateways.get(topic, topic)
         used_on = frozenset(sides.get(resource.group, {Side.SOFTWARE}))

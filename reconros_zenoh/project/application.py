@@ -13,9 +13,10 @@ from reconros_zenoh.board.executor import Executor
 from reconros_zenoh.board.hmt import HmtSource, HmtWriter
 from reconros_zenoh.board.os_resources import Condition, Mailbox, Mutex, Semaphore, SharedMemory
 from reconros_zenoh.board.stack_node import StackNode
-from reconros_zenoh.errors import UsageError
+from reconros_zenoh.errors import FileError, UsageError
 from reconros_zenoh.executor.callbacks import CallbackKind
-from reconros_zenoh.project.communication import gateway_pair, topic_name
+from reconros_zenoh.project.build_cfg import RosGateway
+from reconros_zenoh.project.communication import endpoint_name, gateway_pair, gateway_slots
 from reconros_zenoh.rmw.parameters import Parameters
 
 if TYPE_CHECKING:
@@ -85,8 +86,8 @@ class Application:
                 return ServiceSource(
                     self.board,
                     self._node(resource),
-                    self.types.service(_required(resource.interface)),
-                    _required(resource.ros_name),
+                    self._type(resource, self.types.service),
+                    self._ros_name(resource),
                 )
             case "rossrvc":
                 return self.client(group, name)
@@ -94,8 +95,8 @@ class Application:
                 return ActionSource(
                     self.board,
                     self._node(resource),
-                    self.types.action(_required(resource.interface)),
-                    _required(resource.ros_name),
+                    self._type(resource, self.types.action),
+                    self._ros_name(resource),
                 )
             case "rosactionc":
                 return self.action_client(group, name)
@@ -111,8 +112,8 @@ class Application:
         return SubscriptionSource(
             self.board,
             self._node(resource),
-            self.types.message(_required(resource.interface)),
-            _required(resource.ros_name),
+            self._type(resource, self.types.message),
+            self._ros_name(resource),
             qos,
             in_hardware=self._in_hardware(resource),
         )
@@ -126,8 +127,8 @@ class Application:
             lambda resource: ClientSource(
                 self.board,
                 self._node(resource),
-                self.types.service(_required(resource.interface)),
-                _required(resource.ros_name),
+                self._type(resource, self.types.service),
+                self._ros_name(resource),
             ),
         )
 
@@ -140,8 +141,8 @@ class Application:
             lambda resource: ActionClientSource(
                 self.board,
                 self._node(resource),
-                self.types.action(_required(resource.interface)),
-                _required(resource.ros_name),
+                self._type(resource, self.types.action),
+                self._ros_name(resource),
             ),
         )
 
@@ -153,7 +154,7 @@ class Application:
             return HmtWriter(self._hardware_topic(resource))
         return self.board.writer(
             self._node(resource),
-            self.types.message(_required(resource.interface)),
+            self._type(resource, self.types.message),
             _required(resource.ros_name),
             qos,
         )
@@ -260,15 +261,31 @@ class Application:
         if self.executor is None:
             raise UsageError("app.spin() without a callback. Call app.register(...) first.")
         configuration = self.project.configuration
+        slots = gateway_slots(configuration, self.mapping.callbacks)
         for gateway in configuration.gateways:
             pair = gateway_pair(configuration.path, gateway)
-            self.board.add_gateway(gateway.name, pair.hmt, pair.smt, self.types.message(gateway.type))
+            message_type = self._type(gateway, self.types.message)
+            self.board.add_gateway(
+                gateway.name, pair.hmt, pair.smt, message_type, slots[gateway.name], gateway.qos
+            )
         self.executor.spin()
 
     def close(self) -> None:
         """Take the nodes out of the graph."""
         for node in self._nodes.values():
             node.close()
+
+    def _type(self, end: Resource | RosGateway, find: Callable[[str], T]) -> T:
+        """Return the type of an end or gateway; raise FileError with its line for one that nobody defines."""
+        try:
+            return find(end.type if isinstance(end, RosGateway) else _required(end.interface))
+        except UsageError as error:
+            raise FileError(self.project.configuration.path, end.line, f"{end.name}: {error}") from error
+
+    def _ros_name(self, end: Resource) -> str:
+        """Return the name of an end as written; raise FileError with its line for one that cannot be."""
+        endpoint_name(self.project.configuration.path, end)
+        return _required(end.ros_name)
 
     def _shared(self, group: str, name: str, kind: str, make: Callable[[Resource], T]) -> T:
         if (group, name) not in self._made:
@@ -307,8 +324,8 @@ class Application:
 
     def _hardware_topic(self, resource: Resource) -> HardwareTopic:
         return self.board.hardware_topic(
-            topic_name(self.project.configuration.path, resource),
-            self.types.message(_required(resource.interface)),
+            endpoint_name(self.project.configuration.path, resource),
+            self._type(resource, self.types.message),
         )
 
     def _node(self, resource: Resource) -> Node:

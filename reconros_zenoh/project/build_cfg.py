@@ -11,12 +11,13 @@ import re
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from reconros_zenoh.errors import FileError
+from reconros_zenoh.errors import FileError, UsageError
 from reconros_zenoh.project.clocks import read_clock, read_clock_name
 from reconros_zenoh.project.ini import Section, read_sections, unique_names
 from reconros_zenoh.project.resource_groups import read_resource_groups
 from reconros_zenoh.project.slots import REGION_OPTION, read_slot_ids, read_slots
 from reconros_zenoh.project.type_names import inline_message_type
+from reconros_zenoh.ros.qos import QosProfile
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Iterator
@@ -27,6 +28,8 @@ if TYPE_CHECKING:
     from reconros_zenoh.project.resource_groups import Resource
     from reconros_zenoh.project.slots import HwSlot
 
+# Of a gateway; an extension of ours.
+_QOS_OPTIONS = ("Reliability", "Durability", "History", "Depth")
 _KNOWN_OPTIONS = {
     "General": frozenset(
         {
@@ -55,7 +58,7 @@ _KNOWN_OPTIONS = {
     "ReconosThread": frozenset(
         {"Slot", "HwSource", "SwSource", "ResourceGroup", "UseMem", "VideoOut", "Ports"}
     ),
-    "ROSGateway": frozenset({"Slot", "HWTopic", "SWTopic", "MsgType"}),
+    "ROSGateway": frozenset({"Slot", "HWTopic", "SWTopic", "MsgType", *_QOS_OPTIONS}),
 }
 _KINDS = {*_KNOWN_OPTIONS, "ResourceGroup"}
 
@@ -89,9 +92,10 @@ class ReconosThread:
 
 @dataclass(frozen=True)
 class RosGateway:
-    """A gateway between a hardware-mapped and a software-mapped topic, and the ids of the slots it sits in.
+    """A gateway between a hardware-mapped and a software-mapped topic.
 
-    `type` is the ROS 2 name of the message type.
+    `slots` are the ids of the slots that it can be built for, `type` is the ROS 2 name of the message type,
+    `qos` that of both its ends on the software-mapped topic.
     """
 
     name: str
@@ -99,6 +103,7 @@ class RosGateway:
     hw_topic: str
     sw_topic: str
     type: str
+    qos: QosProfile
     line: int
 
 
@@ -294,5 +299,20 @@ def _gateway(name: str, section: Section, slots: Collection[HwSlot], warnings: l
         hw_topic=hw_topic.value.strip('"'),
         sw_topic=sw_topic.value.strip('"'),
         type=message_type,
+        qos=_qos(section),
         line=section.line,
     )
+
+
+def _qos(section: Section) -> QosProfile:
+    words: dict[str, str | int] = {}
+    for name in _QOS_OPTIONS:
+        if section.value(name) is None:
+            continue
+        option = section.required(name)
+        words[name.lower()] = section.number(name) if name == "Depth" else option.value.lower()
+        try:
+            QosProfile.of_words(words)
+        except UsageError as error:
+            raise option.error(f"{section} cannot have this QoS:", str(error)) from None
+    return QosProfile.of_words(words)

@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 _ENDS = {"rossub": "subscriber", "rospub": "publisher"}
 
 
-def topic_name(path: Path, resource: Resource) -> str:
-    """Return the absolute name of the topic that a rossub or rospub of the project file `path` belongs to.
+def endpoint_name(path: Path, resource: Resource) -> str:
+    """Return the absolute name of the topic, service or action of an end in the project file `path`.
 
     Raise FileError for a name that ROS 2 does not allow.
     """
@@ -33,7 +33,7 @@ def topic_name(path: Path, resource: Resource) -> str:
 
 
 def gateway_pair(path: Path, gateway: RosGateway) -> Pair:
-    """Return the absolute names of the topics of a gateway; raise FileError as `topic_name`."""
+    """Return the absolute names of the topics of a gateway; raise FileError as `endpoint_name`."""
     hmt, smt = (
         _resolved(path, gateway.line, topic, "/", gateway.name)
         for topic in (gateway.hw_topic, gateway.sw_topic)
@@ -47,8 +47,8 @@ def check_topics(configuration: BuildConfiguration) -> None:
     software: defaultdict[str, list[Resource]] = defaultdict(list)
     for resource in configuration.resources:
         if resource.type in _ENDS:
-            topic = topic_name(configuration.path, resource)
-            (hardware if resource.hardware_mapped else software)[topic].append(resource)
+            name = endpoint_name(configuration.path, resource)
+            (hardware if resource.hardware_mapped else software)[name].append(resource)
     pairs = _checked_gateways(configuration, hardware, software)
     bridged = {pair.hmt: pair.smt for pair in pairs}
     for topic, ends in hardware.items():
@@ -65,7 +65,21 @@ def check_topics(configuration: BuildConfiguration) -> None:
 
 
 def check_places(configuration: BuildConfiguration, callbacks: Mapping[str, CallbackMapping]) -> None:
-    """Raise FileError at the line of a hardware-mapped end whose callback may run in software."""
+    """Raise FileError at the line of what cannot be where it would be.
+
+    That is a hardware-mapped end whose callback may run in software, a slot that is not reconfigurable and
+    would have to hold two callbacks, and a gateway without a slot of its own.
+    """
+    for slot in configuration.slots:
+        tenants = [name for name, callback in callbacks.items() if slot.id in callback.slots]
+        if len(tenants) > 1 and not slot.reconfigurable:
+            raise FileError(
+                configuration.path,
+                slot.line,
+                f"{slot.name} (Id {slot.id}) is not reconfigurable, but {' and '.join(tenants)} are mapped "
+                "to it.",
+                "Map one callback to it, or write `Reconfigurable = true`.",
+            )
     for thread in configuration.threads:
         for resource in configuration.resources:
             if (
@@ -80,15 +94,38 @@ def check_places(configuration: BuildConfiguration, callbacks: Mapping[str, Call
                     f"{_ENDS[resource.type]} of a hardware-mapped topic.",
                     "Map the callback to slots only, or the topic to software, with a gateway between.",
                 )
+    gateway_slots(configuration, callbacks)
+
+
+def gateway_slots(
+    configuration: BuildConfiguration, callbacks: Mapping[str, CallbackMapping]
+) -> dict[str, int]:
+    """Return the id of the slot that each gateway has for itself: one that no callback is mapped to.
+
+    Of the slots that a gateway can be built for it is the first, if possible one that no thread is built for.
+    Raise FileError at the line of a gateway that none is left for.
+    """
+    threads = {slot for thread in configuration.threads if thread.hardware for slot in thread.slots}
+    tenants = {slot: f"the callback {name}" for name, mapped in callbacks.items() for slot in mapped.slots}
+    slots: dict[str, int] = {}
     for gateway in configuration.gateways:
-        for name, callback in callbacks.items():
-            if set(gateway.slots) & set(callback.slots):
-                raise FileError(
-                    configuration.path,
-                    gateway.line,
-                    f"The gateway {gateway.name} sits in a slot that the callback {name} is mapped to.",
-                    "Give the gateway a slot of its own.",
-                )
+        free = [slot for slot in gateway.slots if slot not in tenants]
+        if not free:
+            others = dict.fromkeys(tenants[slot] for slot in gateway.slots)
+            raise FileError(
+                configuration.path,
+                gateway.line,
+                f"The gateway {gateway.name} has no slot for itself: "
+                + (
+                    f"its Slot names only those of {' and '.join(others)}."
+                    if others
+                    else "its Slot names none."
+                ),
+                "Name another one there.",
+            )
+        slots[gateway.name] = min(free, key=lambda slot: slot in threads)
+        tenants[slots[gateway.name]] = f"the gateway {gateway.name}"
+    return slots
 
 
 def _check_ends(configuration: BuildConfiguration, topic: str, ends: list[Resource]) -> None:

@@ -14,7 +14,7 @@ from reconros_zenoh.project.build_cfg import read_build_cfg
 from reconros_zenoh.project.communication import check_places, check_topics
 from reconros_zenoh.project.interfaces import read_interfaces
 from reconros_zenoh.project.main_file import load_main, running_project
-from reconros_zenoh.project.mapping_file import Mapping, bitstream_slots, read_mapping
+from reconros_zenoh.project.mapping_file import Mapping, built_for, read_mapping
 from reconros_zenoh.project.resources import slot_resources
 from reconros_zenoh.text_file import read_text_file
 
@@ -45,7 +45,7 @@ class Project:
 
     @property
     def slots(self) -> tuple[SlotPlan, ...]:
-        """The reconfigurable slots with the resources of their regions and their clocks."""
+        """The slots with the resources of their regions and their clocks."""
         clocks = {clock.name: clock.hz for clock in self.configuration.clocks}
         return tuple(
             SlotPlan(
@@ -54,9 +54,9 @@ class Project:
                 resources.dsp,
                 resources.bram36,
                 clocks[slot.clock] if slot.clock else None,
+                slot.reconfigurable,
             )
             for slot in self.configuration.slots
-            if slot.reconfigurable
             for resources in [slot_resources(slot.regions)]
         )
 
@@ -116,7 +116,7 @@ class Project:
         else:
             mapping = read_mapping(
                 self.mapping_path(name_or_file),
-                bitstream_slots(self.configuration),
+                built_for(self.configuration),
                 [slot.slot_id for slot in self.slots],
             )
         check_places(self.configuration, mapping.callbacks)
@@ -137,12 +137,17 @@ class Project:
         return {path.stem: path for path in sorted((self.folder / "mappings").glob("*.toml"))}
 
     def bitstreams(self, profile: Profile) -> list[Bitstream]:
-        """Return the bitstream of each callback for each slot it can be built for."""
-        sizes = {slot.slot_id: profile.bitstream_size(slot.lut, slot.dsp, slot.bram36) for slot in self.slots}
+        """Return the bitstream of each callback for each reconfigurable slot that it is built for."""
+        sizes = {
+            slot.slot_id: profile.bitstream_size(slot.lut, slot.dsp, slot.bram36)
+            for slot in self.slots
+            if slot.reconfigurable
+        }
         return [
             Bitstream(slot, callback, sizes[slot])
-            for callback, slots in bitstream_slots(self.configuration).items()
+            for callback, slots in built_for(self.configuration).items()
             for slot in slots
+            if slot in sizes
         ]
 
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal, Self
 from pydantic import BaseModel, ConfigDict, Field, StrictBool, StrictInt, ValidationError
 
 from reconros_zenoh.errors import FileError
+from reconros_zenoh.project.communication import gateway_slots
 from reconros_zenoh.toml_file import TomlFile
 
 if TYPE_CHECKING:
@@ -45,34 +46,39 @@ class Mapping(BaseModel):
 
     @classmethod
     def default(cls, configuration: BuildConfiguration) -> Self:
-        """Return the mapping of a project without mapping files: what can be in hardware is, all else not."""
-        slots = bitstream_slots(configuration)
+        """Return the mapping of a project without mapping files: what can be in hardware is, all else not.
+
+        A callback gets all reconfigurable slots that it is built for; without any, the first other slot that
+        no callback before it has. A gateway's slot is the gateway's.
+        """
+        reconfigurable = {slot.id for slot in configuration.slots if slot.reconfigurable}
+        gateways = set(gateway_slots(configuration, {}).values())
+        taken = set(gateways)
+        callbacks: dict[str, CallbackMapping] = {}
+        for name, slots in built_for(configuration).items():
+            own = tuple(slot for slot in slots if slot in reconfigurable - gateways)
+            own = own or tuple(slot for slot in slots if slot not in taken)[:1]
+            taken.update(set(own) - reconfigurable)
+            callbacks[name] = CallbackMapping(software=not own, slots=own)
         return cls(
             name="default",
             executor="reconros",
             software_workers=2,
-            hardware_workers=sum(slot.reconfigurable for slot in configuration.slots),
-            callbacks={
-                name: CallbackMapping(software=not built_for, slots=built_for)
-                for name, built_for in slots.items()
-            },
+            hardware_workers=len(configuration.slots),
+            callbacks=callbacks,
         )
 
 
-def bitstream_slots(configuration: BuildConfiguration) -> dict[str, tuple[int, ...]]:
-    """Return the ids of the reconfigurable slots that each callback is built for."""
-    reconfigurable = {slot.id for slot in configuration.slots if slot.reconfigurable}
-    return {
-        thread.name: tuple(slot for slot in thread.slots if slot in reconfigurable and thread.hardware)
-        for thread in configuration.threads
-    }
+def built_for(configuration: BuildConfiguration) -> dict[str, tuple[int, ...]]:
+    """Return the ids of the slots that each callback is built for in hardware."""
+    return {thread.name: thread.slots if thread.hardware else () for thread in configuration.threads}
 
 
 def read_mapping(path: Path, callbacks: Map[str, Collection[int]], slots: Collection[int]) -> Mapping:
     """Return the mapping in a TOML file, checked against its project.
 
-    `callbacks` are the project's callbacks with the ids of the slots that they have bitstreams for, `slots`
-    the ids of all slots. `FileError` names the line of the first mistake. Each callback has to be mapped.
+    `callbacks` are the project's callbacks with the ids of the slots that they are built for, `slots` the ids
+    of all slots. `FileError` names the line of the first mistake. Each callback has to be mapped.
     """
     toml = TomlFile.read(path)
     if "name" in toml.content:
@@ -84,6 +90,7 @@ def read_mapping(path: Path, callbacks: Map[str, Collection[int]], slots: Collec
         )
     except ValidationError as error:
         raise _schema_error(toml, error) from None
+    _check_workers(toml, mapping, slots)
     for name in mapping.callbacks:
         if name not in callbacks:
             raise FileError(
@@ -102,6 +109,23 @@ def read_mapping(path: Path, callbacks: Map[str, Collection[int]], slots: Collec
             f"Add `[callbacks.{missing[0]}]` with `software = true` or `slots = [...]`.",
         )
     return mapping
+
+
+def _check_workers(toml: TomlFile, mapping: Mapping, slots: Collection[int]) -> None:
+    if mapping.hardware_workers > len(slots):
+        raise FileError(
+            toml.path,
+            toml.line(["hardware_workers"]),
+            f"There are {mapping.hardware_workers} hardware workers, but the project has {len(slots)} slots.",
+            "Give at most one for each slot.",
+        )
+    if mapping.hardware_workers and mapping.executor == "standard":
+        raise FileError(
+            toml.path,
+            toml.line(["hardware_workers"]),
+            "The standard executor has no hardware workers.",
+            'Use `executor = "reconros"` or take them away.',
+        )
 
 
 def _check_callback(
@@ -127,8 +151,8 @@ def _check_callback(
     if unbuilt:
         raise error(
             ["slots"],
-            f"The callback {name} is mapped to slot {unbuilt[0]}, for which its thread has no bitstream.",
-            f"It has bitstreams for: {', '.join(map(str, built_for)) or 'none'}; see HwSource and Slot of "
+            f"The callback {name} is mapped to slot {unbuilt[0]}, which its thread is not built for.",
+            f"It is built for: {', '.join(map(str, built_for)) or 'none'}; see HwSource and Slot of "
             f"[ReconosThread@{name}] in build.cfg.",
         )
     if callback.slots and mapping.executor == "standard":
@@ -141,6 +165,15 @@ def _check_callback(
         raise error(
             ["slots"],
             f"The callback {name} is mapped to slots, but there are 0 hardware workers.",
+            "Raise `hardware_workers`.",
+        )
+    served = sorted(slots)[: mapping.hardware_workers]
+    unserved = [slot for slot in callback.slots if slot not in served]
+    if unserved:
+        raise error(
+            ["slots"],
+            f"The callback {name} is mapped to slot {unserved[0]}, which no hardware worker serves; "
+            f"they serve {', '.join(map(str, served))}.",
             "Raise `hardware_workers`.",
         )
     if callback.software and mapping.software_workers == 0:

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Self, TypeVar
+from typing import TYPE_CHECKING, Any, Self, TypeVar
 
 from reconros_zenoh.errors import UsageError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
 
 INFINITE_NS = 2**63 - 1
 """The infinite duration of rmw: 9223372036 s and 854775807 ns."""
@@ -14,6 +17,7 @@ INFINITE_NS = 2**63 - 1
 _SECOND_NS = 1_000_000_000
 _INFINITE_S, _INFINITE_REST_NS = divmod(INFINITE_NS, _SECOND_NS)
 _LARGEST_DEPTH = 2**64 - 1
+_DEEPEST_QUEUE = 2**31 - 1
 
 
 class Reliability(IntEnum):
@@ -59,6 +63,34 @@ class QosProfile:
     lifespan_ns: int = INFINITE_NS
     liveliness: Liveliness = Liveliness.AUTOMATIC
     lease_ns: int = INFINITE_NS
+
+    @classmethod
+    def of_words(cls, words: Mapping[str, str | int]) -> Self:
+        """Return the profile with these policies, named as in the QoS files and options of ROS 2.
+
+        `words` may have "reliability": "reliable" or "best_effort", "durability": "volatile" or
+        "transient_local", "history": "keep_last" or "keep_all", and "depth"; what is missing has its default.
+        Raises UsageError for anything else.
+        """
+        policies: dict[str, Any] = {}
+        for name, word in words.items():
+            if name == "depth":
+                if not isinstance(word, int) or not 0 < word <= _DEEPEST_QUEUE:
+                    raise UsageError(f"depth is {word!r}. Write a number from 1 to {_DEEPEST_QUEUE}.")
+                policies[name] = word
+            elif name in _POLICIES:
+                known = {policy.name.lower(): policy for policy in _POLICIES[name]}
+                if word not in known:
+                    raise UsageError(f"{name} is {word!r}. Write {' or '.join(known)}.")
+                policies[name] = known[str(word)]
+            else:
+                raise UsageError(f"there is no QoS policy {name!r}. Known: {', '.join(_POLICIES)}, depth.")
+        return cls(**policies)
+
+    def words(self) -> dict[str, str | int]:
+        """Return the policies that `of_words` takes, all of them."""
+        policies = {name: getattr(self, name).name.lower() for name in _POLICIES}
+        return {**policies, "depth": self.depth}
 
     @property
     def queue_depth(self) -> int | None:
@@ -111,6 +143,11 @@ class QosProfile:
         )
 
 
+_POLICIES: Mapping[str, type[IntEnum]] = {
+    "reliability": Reliability,
+    "durability": Durability,
+    "history": History,
+}
 _RMW_DEFAULT = QosProfile(depth=42)
 
 _Policy = TypeVar("_Policy", Reliability, Durability, History, Liveliness)

@@ -17,7 +17,7 @@ from reconros_zenoh.ros.types import TypeRegistry
 from reconros_zenoh.transport.simulated import SimulatedNetwork
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Generator, Mapping
+    from collections.abc import Callable, Container, Generator, Mapping
 
     import simpy
 
@@ -73,7 +73,7 @@ def small_profile(
 
     model = {
         "cores": {"count": of(cores, "1"), "clock": of(1, "GHz")},
-        "fabric": {"infrastructure_clock": of(1, "GHz"), "thread_clock": of(1, "GHz")},
+        "fabric": {"thread_clock": of(1, "GHz")},
         "executor": {
             "hardware_poll": of(hardware_poll_ns, "ns"),
             "software_poll": of(software_poll_ns, "ns"),
@@ -139,14 +139,15 @@ def small_board(
     pointer_bytes: int = 4,
     network: SimulatedNetwork | None = None,
     name: str = "board0",
+    static: Container[int] = (),
 ) -> Board:
-    """A board in a network of its own, or in this one."""
+    """A board in a network of its own, or in this one; the `static` slots are not reconfigurable."""
     if network is None:
         network = SimulatedNetwork(environment or VirtualEnvironment())
     environment = network.environment
     session = f"b{name.removeprefix('board')}"
     context = Context(network.transport(session), 0, environment.clock_ns)
-    plans = tuple(SlotPlan(slot, 100, 0, 0) for slot in range(slots))
+    plans = tuple(SlotPlan(slot, 100, 0, 0, None, slot not in static) for slot in range(slots))
     return Board(
         environment, context, profile, plans, threads=threads, name=name, pointer_bytes=pointer_bytes
     )

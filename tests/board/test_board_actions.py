@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from small_board import Steps
 
     from reconros_zenoh.board.callback import HardwareThread
+    from reconros_zenoh.board.profile import Profile
     from reconros_zenoh.board.software import SoftwareContext
     from reconros_zenoh.rmw.action_client import ActionEvent
     from reconros_zenoh.rmw.action_server import GoalHandle
@@ -162,8 +163,8 @@ def test_goals_that_are_refused() -> None:
 class Asking:
     """A board with an action client, and a server on the desktop that refuses odd orders."""
 
-    def __init__(self, *, hardware: bool) -> None:
-        self.board = small_board(PROFILE, 2)
+    def __init__(self, *, hardware: bool, profile: Profile = PROFILE) -> None:
+        self.board = small_board(profile, 2)
         node = self.board.context.node("client")
         self.client = ActionClientSource(self.board, node, FIBONACCI, "fibonacci")
         self.executor, self.tickets = Executor(self.board, 1, 2), Tickets(self.board)
@@ -235,6 +236,17 @@ def test_a_client_cancels_its_goal(hardware: bool) -> None:
     assert case.run(0, -1) == ["accepted", "canceling"]
 
 
+def test_goals_that_are_pushed_out_before_they_are_sent_are_told_as_unanswered() -> None:
+    profile = small_profile({"ask": (10, 10), "hear": (10, 10)}, dds_message_ns=1000)
+    case = Asking(hardware=False, profile=profile)
+    for _ in range(15):
+        case.tickets.put(0)
+    case.board.environment.run(until=10**6)
+    kinds = {event.goal_id: event.kind for event in case.events}
+    assert len(case.handles) == 11
+    assert [kinds[goal_id] for goal_id in case.sent] == ["accepted"] + ["unanswered"] * 4 + ["accepted"] * 10
+
+
 def test_old_feedback_makes_room_and_nothing_else_does() -> None:
     case = Asking(hardware=False)
     case.executor.select = lambda *_: None  # type: ignore[method-assign] # nobody takes anything
@@ -265,6 +277,34 @@ def test_a_goal_is_taken_as_it_is_when_it_is_sent() -> None:
     tickets.put(None)
     case.board.environment.run(until=10**6)
     assert [handle.goal.order for handle in case.handles] == [0]
+
+
+@pytest.mark.parametrize("goal_id", [b"", b"too short", bytes(17), "a" * 16, 16, None])
+def test_with_what_is_no_goal_id_nothing_of_the_call_is_sent(
+    goal_id: Any, caplog: pytest.LogCaptureFixture
+) -> None:
+    case = Asking(hardware=False)
+
+    def ask(_: object, context: SoftwareContext) -> None:
+        context.send_goal(case.client, case.client.goal(order=0))
+        context.cancel_goal(case.client, goal_id)
+
+    executor, tickets = Executor(case.board, 1, 0), Tickets(case.board)
+    executor.add_sw_callback("ask", SUB, tickets, ask)
+    executor.spin()
+    tickets.put(None)
+    case.board.environment.run(until=10**6)
+    assert executor.failures == {"ask": 1}
+    assert f"{goal_id!r} is no goal id. Give the 16 bytes that `send_goal` has returned." in caplog.text
+    assert not case.handles
+
+
+def test_in_hardware_what_is_no_goal_id_fails_the_callback(caplog: pytest.LogCaptureFixture) -> None:
+    case = Asking(hardware=True)
+    case.sent.append(b"too short")
+    assert case.run(-1) == []
+    assert case.executor.failures == {"ask": 1}
+    assert "b'too short' is no goal id" in caplog.text
 
 
 def test_with_a_goal_of_a_wrong_type_nothing_of_the_call_is_sent(caplog: pytest.LogCaptureFixture) -> None:

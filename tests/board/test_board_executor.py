@@ -70,6 +70,18 @@ def test_the_native_profile_needs_no_times() -> None:
     Executor(board, 1, 0).add_sw_callback("walk", SUB, Tickets(board), ignore)
 
 
+def test_what_is_added_too_late_is_refused_and_so_is_a_second_spin() -> None:
+    board = small_board(PROFILE, 1)
+    executor = Executor(board, 1, 1)
+    executor.add_sw_callback("a", SUB, Tickets(board), ignore)
+    executor.spin()
+    with pytest.raises(UsageError, match="'b' is added to an executor that spins already"):
+        executor.add_sw_callback("b", SUB, Tickets(board), ignore)
+    with pytest.raises(UsageError, match="the executor spins already"):
+        executor.spin()
+    assert list(executor.statistics()) == ["a"]
+
+
 def test_two_callbacks_of_one_name() -> None:
     board = small_board(PROFILE)
     executor = Executor(board, 1, 0)

@@ -80,11 +80,14 @@ def test_what_the_board_sends_arrives(reliability: Reliability) -> None:
     assert writer.dropped == 0
 
 
+@pytest.mark.parametrize("topics", [None, {}], ids=["network only", "local topics"])
 @pytest.mark.parametrize("durability", Durability)
-def test_a_late_reader_gets_the_last_messages_of_a_transient_local_writer(durability: Durability) -> None:
-    board = small_board(small_profile())
+def test_a_late_reader_gets_the_last_messages_of_a_transient_local_writer(
+    durability: Durability, topics: dict[str, float] | None
+) -> None:
+    board = small_board(small_profile(topics=topics))
     qos = QosProfile(durability=durability, depth=2)
-    writer = TopicWriter(board, board.context.node("writer"), WORD, "out", qos)
+    writer = board.writer(board.context.node("writer"), WORD, "out", qos)
     for number in range(5):
         parts = writer.encode(writer.message(data=number))
         writer.send(parts, Timeline(board.environment, board.environment.now))

@@ -18,6 +18,8 @@ from reconros_zenoh.board.profile import Profile, read_profile
 from reconros_zenoh.board.spans import Timeline
 from reconros_zenoh.clock.virtual import VirtualEnvironment
 from reconros_zenoh.errors import UsageError
+from reconros_zenoh.ros.graph import EndpointKind, EndpointToken, parse, tokens_expression
+from reconros_zenoh.ros.qos import Durability, QosProfile, Reliability
 from reconros_zenoh.transport.simulated import SimulatedNetwork
 
 if TYPE_CHECKING:
@@ -57,7 +59,7 @@ def modelled(**options: Any) -> Profile:
 class Side:
     """A board with a gateway between /a in hardware and /a in software, and who heard what when on it."""
 
-    def __init__(self, board: Board, subscribers: int = 2) -> None:
+    def __init__(self, board: Board, subscribers: int = 2, qos: QosProfile | None = None) -> None:
         self.board = board
         self.environment = board.environment
         self.node = board.context.node("n")
@@ -69,7 +71,7 @@ class Side:
         source = SubscriptionSource(board, self.node, words, "/a")
         source.open(lambda: self.software.append((self.environment.now, source.take().message)), None)
         self.writer = board.writer(self.node, words, "/a")
-        self.gateway = board.add_gateway("bridge", "/a", "/a", words)
+        self.gateway = board.add_gateway("bridge", "/a", "/a", words, 0, qos)
 
     def _listen(self, heard: list[tuple[int, Any]]) -> None:
         def note() -> None:
@@ -93,7 +95,7 @@ class Side:
 
 @pytest.mark.parametrize("subscribers", [1, 4])
 def test_from_hardware_a_message_is_streamed_to_all_and_written_to_memory_once(subscribers: int) -> None:
-    side = Side(small_board(modelled()), subscribers)
+    side = Side(small_board(modelled(), 2), subscribers)
     body = message()
     side.publish_in_hardware(body)
     side.environment.run()
@@ -105,7 +107,7 @@ def test_from_hardware_a_message_is_streamed_to_all_and_written_to_memory_once(s
 
 @pytest.mark.parametrize("subscribers", [1, 4])
 def test_from_software_it_is_read_from_memory_once_while_it_is_streamed(subscribers: int) -> None:
-    side = Side(small_board(modelled()), subscribers)
+    side = Side(small_board(modelled(), 2), subscribers)
     body = message()
     side.publish_in_software(body)
     side.environment.run()
@@ -116,7 +118,7 @@ def test_from_software_it_is_read_from_memory_once_while_it_is_streamed(subscrib
 
 
 def test_a_message_between_request_and_cancel_is_forwarded() -> None:
-    side = Side(small_board(modelled()))
+    side = Side(small_board(modelled(), 2))
     # Published on the SMT so that it is ready while the core cancels for what came over the HMT.
     side.publish_in_software(message(1))
     side.environment.run(until=A + K * U + D - 2 * U)
@@ -128,7 +130,7 @@ def test_a_message_between_request_and_cancel_is_forwarded() -> None:
 
 
 def test_messages_from_both_sides_take_turns() -> None:
-    side = Side(small_board(modelled()))
+    side = Side(small_board(modelled(), 2))
     for number in range(6):
         side.publish_in_software(message(number))
         side.publish_in_hardware(message(100 + number))
@@ -143,7 +145,7 @@ def test_messages_from_both_sides_take_turns() -> None:
 @pytest.mark.parametrize("profile", [modelled(), small_profile(), read_profile("native")])
 def test_boards_whose_gateways_share_a_topic_hear_each_other_once(profile: Profile) -> None:
     network = SimulatedNetwork(VirtualEnvironment())
-    sides = [Side(small_board(profile, network=network, name=f"board{index}")) for index in range(3)]
+    sides = [Side(small_board(profile, slots=2, network=network, name=f"board{index}")) for index in range(3)]
     network.environment.run()
     heard_elsewhere: list[int] = []
     node = desktop(sides[0].board).node("desk")
@@ -164,7 +166,7 @@ def test_a_message_that_no_fifo_holds_is_refused_and_the_gateway_goes_on(
     topics: Any, caplog: pytest.LogCaptureFixture
 ) -> None:
     profile = small_profile(topics=topics, cores=4, hmt_overhead_ns=G, cancel_ns=C)
-    side = Side(small_board(profile))
+    side = Side(small_board(profile, 2))
     side.environment.run()
     elsewhere = [desktop(side.board).node(name).publisher(words, "/a") for name in ("x", "y")]
     side.topic.subscribe(Fifo(FifoPlan(100, message_bytes=U), lambda: None, None, cut_through=False))
@@ -184,16 +186,49 @@ def test_a_message_that_no_fifo_holds_is_refused_and_the_gateway_goes_on(
 
 
 def test_a_second_gateway_on_a_topic_is_refused_and_so_is_another_type() -> None:
-    side = Side(small_board(modelled()))
+    side = Side(small_board(modelled(), 2))
     for hmt, smt, taken in (("/a", "/b", "hmt/board0/a"), ("/b", "/a", "/a")):
         with pytest.raises(UsageError, match=f"^{taken} has a gateway on board 'board0' already"):
-            side.board.add_gateway("second", hmt, smt, words)
+            side.board.add_gateway("second", hmt, smt, words, 1)
     side.board.hardware_topic("/c", words)
     with pytest.raises(UsageError, match="has the type std_msgs/msg/UInt8MultiArray"):
-        side.board.add_gateway("second", "/c", "/c", types().message("std_msgs/msg/UInt32"))
+        side.board.add_gateway("second", "/c", "/c", types().message("std_msgs/msg/UInt32"), 1)
     side.publish_in_software(message(1))
     side.environment.run()
     assert side.numbers() == [[1], [1], [1]]
+
+
+def test_its_slot_holds_it_from_the_start_and_nothing_else() -> None:
+    side = Side(small_board(modelled(), 2))
+    slot = side.board.slots[0]
+    assert slot.holds is not None
+    assert (slot.holds.callback, slot.reconfigurations) == ("bridge", 0)
+    with pytest.raises(UsageError, match="'second' cannot be in slot 0, which is for bridge"):
+        side.board.add_gateway("second", "/b", "/b", words, 0)
+
+
+def test_its_ends_have_its_qos() -> None:
+    board = small_board(modelled(), 2)
+    qos = QosProfile(Reliability.BEST_EFFORT, Durability.TRANSIENT_LOCAL, depth=3)
+    board.add_gateway("bridge", "/a", "/a", words, 0, qos)
+    seen = [parse(key) for key in desktop(board).transport.tokens(tokens_expression(0), 0)]
+    ends = {token.kind: token.qos for token in seen if isinstance(token, EndpointToken)}
+    assert ends == {EndpointKind.PUBLISHER: qos, EndpointKind.SUBSCRIPTION: qos}
+
+
+def test_with_a_short_queue_it_keeps_the_newest() -> None:
+    side = Side(small_board(modelled(), 2), qos=QosProfile(depth=1))
+    nobody_takes = Fifo(FifoPlan(depth=1), lambda: None, None, cut_through=False)
+    side.topic.subscribe(nobody_takes)
+    for number in range(5):
+        side.publish_in_software(message(number))
+    side.environment.run()
+    # 0 fills the FIFO, the core waits with 1; 4 has pushed 2 and 3 out.
+    assert side.gateway.dropped == 2
+    for _ in range(3):
+        nobody_takes.take()
+        side.environment.run()
+    assert side.numbers() == [[0, 1, 4], [0, 1, 4], [0, 1, 2, 3, 4]]
 
 
 def test_a_profile_must_know_gateways() -> None:
@@ -201,12 +236,14 @@ def test_a_profile_must_know_gateways() -> None:
     assert profile.model is not None
     ignorant = profile.model_copy(update={"model": profile.model.model_copy(update={"gateway": None})})
     with pytest.raises(UsageError, match=r"\[model.gateway\]"):
-        small_board(ignorant).add_gateway("g", "/a", "/a", words)
+        small_board(ignorant, 1).add_gateway("g", "/a", "/a", words, 0)
 
 
 def test_a_closed_board_takes_its_gateway_out_of_the_graph() -> None:
     network = SimulatedNetwork(VirtualEnvironment())
-    left, stays = (Side(small_board(modelled(), network=network, name=f"board{index}")) for index in (1, 2))
+    left, stays = (
+        Side(small_board(modelled(), slots=2, network=network, name=f"board{index}")) for index in (1, 2)
+    )
     network.environment.run()
     left.board.close()
     left.node.close()
@@ -217,7 +254,7 @@ def test_a_closed_board_takes_its_gateway_out_of_the_graph() -> None:
 
 
 def test_the_status_tells_what_passed() -> None:
-    side = Side(small_board(modelled()))
+    side = Side(small_board(modelled(), 2))
     side.publish_in_software(message(1))
     side.publish_in_hardware(message(2))
     side.environment.run()
@@ -227,6 +264,8 @@ def test_the_status_tells_what_passed() -> None:
             "hmt": "hmt/board0/a",
             "smt": "/a",
             "type": "std_msgs/msg/UInt8MultiArray",
+            "qos": QosProfile().words(),
+            "slot": 0,
             "to_hmt": 1,
             "to_smt": 1,
             "late": 1,

@@ -2,22 +2,39 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import msgpack
 import pytest
-from small_board import desktop, small_board, small_profile, types
+from small_board import (
+    BITSTREAM_BYTES,
+    Tickets,
+    desktop,
+    logging_thread,
+    small_board,
+    small_profile,
+    types,
+)
 
 from reconros_zenoh.board.control import VERSION, gateways
+from reconros_zenoh.board.executor import Executor
 from reconros_zenoh.board.gateway_control import GatewayServer, check_type
+from reconros_zenoh.board.hmt import Fifo, FifoPlan
+from reconros_zenoh.board.spans import Timeline
 from reconros_zenoh.errors import UsageError
+from reconros_zenoh.executor.callbacks import CallbackKind
+from reconros_zenoh.ros.qos import QosProfile
+
+if TYPE_CHECKING:
+    from collections.abc import Container
 
 ADD = {"name": "bridge", "hmt": "/a", "smt": "/a", "type": "std_msgs/msg/UInt32"}
 
 
 class Running:
-    def __init__(self) -> None:
-        self.board = small_board(small_profile(topics={}))
+    def __init__(self, slots: int = 2, static: Container[int] = ()) -> None:
+        profile = small_profile({"a": (0, 100)}, topics={})
+        self.board = small_board(profile, slots, static=static)
         self.board.hardware_topic("/c", types().message("std_msgs/msg/UInt32"))
         self.server = GatewayServer(self.board, types())
         self.client = desktop(self.board)
@@ -47,6 +64,12 @@ def test_a_gateway_is_added_and_listed() -> None:
     assert running.ask(request()) == answer
 
 
+def test_a_gateway_is_added_with_its_qos() -> None:
+    running = Running()
+    (added,) = running.ask(request(**ADD, qos={"reliability": "best_effort", "depth": 1}))["gateways"]
+    assert added["qos"] == {**QosProfile().words(), "reliability": "best_effort", "depth": 1}
+
+
 @pytest.mark.parametrize(
     ("question", "words"),
     [
@@ -62,6 +85,10 @@ def test_a_gateway_is_added_and_listed() -> None:
         (request(**{**ADD, "hmt": "/b", "smt": "b c"}), "'b c' contains ' '"),
         (request(**{**ADD, "hmt": "/b", "smt": "/b", "name": "a b"}), "The node name 'a b'"),
         (request(name="x"), "no request: Field required"),
+        (request(**{**ADD, "hmt": "/b", "smt": "/b", "qos": {"depth": 0}}), "depth is 0. Write a number"),
+        (request(**{**ADD, "hmt": "/b", "smt": "/b", "qos": {"speed": 1}}), "no QoS policy 'speed'"),
+        (request(**{**ADD, "hmt": "/b", "smt": "/b", "qos": {"depth": 1.5}}), "no request: Input should"),
+        (request(**{**ADD, "hmt": "/b", "smt": "/b", "qos": 5}), "no request: Input should be a valid dict"),
         *(
             (request(**{**ADD, "hmt": "/b", "smt": "/b", key: 5}), "no request: Input should be a valid str")
             for key in ADD
@@ -78,6 +105,50 @@ def test_what_cannot_be_added_is_refused_and_changes_nothing(question: bytes, wo
     assert words in running.ask(question)["refused"]
     assert running.ask(request()) == before
     assert list(running.board.hardware_topics) == topics
+
+
+def test_each_takes_a_slot_and_without_one_it_is_refused() -> None:
+    running = Running()
+    for number, topic in enumerate("ab"):
+        assert not running.ask(request(**{**ADD, "hmt": f"/{topic}", "smt": f"/{topic}"}))["refused"]
+        assert gateways(running.board)[-1]["slot"] == number
+    assert [slot.holds and slot.holds.callback for slot in running.board.slots.values()] == ["bridge"] * 2
+    refused = running.ask(request(**{**ADD, "hmt": "/d", "smt": "/d"}))["refused"]
+    assert refused.startswith("board 'board0' has no slot for a gateway: ")
+    assert len(gateways(running.board)) == 2
+
+
+def test_neither_a_slot_of_a_callback_nor_one_that_cannot_be_loaded_is_free() -> None:
+    running = Running(slots=3, static=[0])
+    executor = Executor(running.board, 0, 3)
+    executor.add_hw_callback("a", [1], CallbackKind.SUB, Tickets(running.board), logging_thread([], "a"))
+    assert not running.ask(request(**ADD))["refused"]
+    assert gateways(running.board)[0]["slot"] == 2
+    with pytest.raises(UsageError, match="'a' cannot be in slot 2, which is for bridge"):
+        executor.add_hw_callback("a", [2], CallbackKind.SUB, Tickets(running.board), logging_thread([], "a"))
+
+
+def test_its_bitstream_is_written_and_what_comes_meanwhile_waits() -> None:
+    running = Running()
+    board, word = running.board, types().message("std_msgs/msg/UInt32")
+    running.ask(request(**ADD, qos={"depth": 5}))
+    assert board.slots[0].reconfigurations == 1
+    heard: list[tuple[int, int]] = []
+
+    def note() -> None:
+        heard.append((board.environment.now, fifo.take().message.data))
+
+    fifo = Fifo(FifoPlan(), note, None, cut_through=False)
+    board.hardware_topic("/d", word).subscribe(fifo)
+    server = GatewayServer(board, types())
+    started_ns = board.environment.now
+    server._add(memoryview(request(**{**ADD, "hmt": "/d", "smt": "/d"})))
+    writer = board.writer(board.context.node("n"), word, "/d")
+    for number in range(3):
+        writer.send(writer.encode(word.cls(data=number)), Timeline(board.environment, started_ns))
+    board.environment.run()
+    assert [number for _, number in heard] == [0, 1, 2]
+    assert min(time_ns for time_ns, _ in heard) >= started_ns + BITSTREAM_BYTES // 2
 
 
 def test_a_closed_server_does_not_answer() -> None:

@@ -9,7 +9,7 @@ from small_board import Tickets, desktop, small_board, small_profile, types
 
 from reconros_zenoh.board.clients import ClientSource
 from reconros_zenoh.board.executor import Executor
-from reconros_zenoh.errors import BadMessageError
+from reconros_zenoh.errors import BadMessageError, TransportError
 from reconros_zenoh.executor.callbacks import CallbackKind
 from reconros_zenoh.ros.attachment import Attachment
 
@@ -28,7 +28,12 @@ class Asking:
     """A board whose callback `ask` calls the service and whose callback `hear` gets the responses."""
 
     def __init__(
-        self, *, hardware: bool = False, serve: bool = True, check: Any = None, **options: Any
+        self,
+        *,
+        hardware: bool = False,
+        serve: bool = True,
+        check: Any = None,
+        **options: Any,
     ) -> None:
         self.board = small_board(small_profile(CALLBACKS, link_ns=1000, osif_ns=7, **options), 2)
         self.client = ClientSource(self.board, self.board.context.node("client"), SET_BOOL, "set", SECOND_NS)
@@ -122,12 +127,44 @@ def test_that_nobody_answers_is_logged_once_until_somebody_does(caplog: pytest.L
     assert caplog.messages == [f"{text}; until one has, this is not reported again"] * 2
 
 
-def test_calls_that_are_pushed_out_before_they_are_sent_are_counted() -> None:
+def test_calls_that_are_pushed_out_before_they_are_sent_are_counted_and_told_as_none(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
     case = Asking(dds_message_ns=1_000_000)
     case.run(*range(15))
     # One goes through the stack, ten wait, each further one pushes the oldest out.
-    assert len(case.requests) == len(case.heard) == 11
-    assert case.executor.statistics()["hear"]["dropped"] == 4
+    assert len(case.requests) == 11
+    unsent = [number for number, (_, response) in zip(case.answered, case.heard, strict=True) if not response]
+    assert unsent == [2, 3, 4, 5]
+    assert sorted(number for number in case.answered if number) == sorted(case.called) == list(range(1, 16))
+    assert case.executor.statistics()["hear"]["dropped"] == case.client.unanswered == 4
+    assert "a call of service /set has no answer: newer calls pushed it out before it was sent" in caplog.text
+
+
+def test_every_call_ends_however_slow_its_callback_is() -> None:
+    class Slow(Asking):
+        def hear_in_hardware(self, thread: HardwareThread) -> Steps:
+            yield self.board.environment.timeout(SECOND_NS // 100)
+            yield from super().hear_in_hardware(thread)
+
+    case = Slow(hardware=True)
+    case.tickets.put_at(*range(0, 15 * 5000, 5000))
+    case.run()
+    assert len(case.requests) == 15
+    assert case.answered == list(range(1, 16))
+    assert case.executor.statistics()["hear"]["dropped"] == 0
+
+
+def test_a_call_that_cannot_be_sent_is_told_as_none(caplog: pytest.LogCaptureFixture) -> None:
+    case = Asking()
+
+    def fail(*_: object, **__: object) -> None:
+        raise TransportError("the session is closed")
+
+    case.client._client.call_encoded = fail  # type: ignore[method-assign]
+    case.run(1)
+    assert [response for _, response in case.heard] == [None]
+    assert "the session is closed" in caplog.text
 
 
 def test_a_server_that_says_nothing_is_given_up_in_time(caplog: pytest.LogCaptureFixture) -> None:

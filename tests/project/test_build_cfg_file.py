@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from reconros_zenoh.errors import FileError
 from reconros_zenoh.project.build_cfg import BuildConfiguration, TargetBoard, read_build_cfg
 from reconros_zenoh.project.regions import Region
+from reconros_zenoh.ros.qos import Durability, History, QosProfile, Reliability
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -221,6 +222,17 @@ def test_all_resource_types_of_the_wild_file(tmp_path: Path) -> None:
         assert (resources[group, "tick"].node, resources[group, "tick"].number) == (f"/worker_{number}", 40)
 
 
+def test_a_gateway_has_the_qos_of_its_section(tmp_path: Path) -> None:
+    def qos(options: str) -> QosProfile:
+        return read(tmp_path, HEAD + SLOT + GATEWAY + options).gateways[0].qos
+
+    assert qos("") == qos("Depth =\n") == QosProfile()
+    assert qos("Reliability = BEST_EFFORT\nDepth = 1\n") == QosProfile(Reliability.BEST_EFFORT, depth=1)
+    assert qos("Durability = transient_local\nHistory = keep_all\n") == QosProfile(
+        durability=Durability.TRANSIENT_LOCAL, history=History.KEEP_ALL
+    )
+
+
 def test_a_password_is_not_shown(tmp_path: Path) -> None:
     configuration = read(tmp_path, "[General]\nName = x\nTargetBoardPassword = secret\n")
     assert configuration.options["TargetBoardPassword"].value == "secret"
@@ -251,6 +263,7 @@ def test_regions_of_a_range_that_does_not_start_at_0(tmp_path: Path, numbers: tu
 
 HEAD = "[General]\nName = x\nPartialReconfiguration = true\n[Clock@c]\nClockSource = static\nClockFreq = 1\n"
 SLOT = "[HwSlot@s(0:1)]\nId = 0\n"
+GATEWAY = "[ROSGateway@g]\nHWTopic = a\nSWTopic = b\nMsgType = std_msgs/UInt32\nSlot = s(0)\n"
 
 MISTAKES = {
     "text before a section": ("Name = x\n", 1, "before the first section"),
@@ -317,6 +330,23 @@ MISTAKES = {
         "unknown resource group g_2",
     ),
     "thread with a bad UseMem": (HEAD + "[ReconosThread@t]\nUseMem = maybe\n", 8, "'maybe'"),
+    "gateway of a reliability that there is not": (
+        HEAD + SLOT + GATEWAY + "Depth = 5\nReliability = somewhat\n",
+        15,
+        "[ROSGateway@g] cannot have this QoS: reliability is 'somewhat'. Write reliable or best_effort.",
+    ),
+    "gateway of a durability that there is not": (
+        HEAD + SLOT + GATEWAY + "Durability = 1\n",
+        14,
+        "durability is '1'. Write transient_local or volatile.",
+    ),
+    "gateway of a history that there is not": (
+        HEAD + SLOT + GATEWAY + "History = all\n",
+        14,
+        "history is 'all'. Write keep_last or keep_all.",
+    ),
+    "gateway of no depth": (HEAD + SLOT + GATEWAY + "Depth = 0\n", 14, "depth is 0. Write a number from 1"),
+    "gateway of a depth in words": (HEAD + SLOT + GATEWAY + "Depth = deep\n", 14, "not a number"),
     "gateway without a slot": (HEAD + "[ROSGateway@g]\n", 7, "has no Slot"),
     "gateway in an unknown slot": (
         HEAD + SLOT + "[ROSGateway@g]\nHWTopic = a\nSWTopic = b\nMsgType = std_msgs/UInt32\nSlot = s(9)\n",

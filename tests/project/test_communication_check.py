@@ -6,8 +6,8 @@ import pytest
 
 from reconros_zenoh.errors import FileError
 from reconros_zenoh.project.build_cfg import read_build_cfg
-from reconros_zenoh.project.communication import check_places, check_topics
-from reconros_zenoh.project.mapping_file import CallbackMapping
+from reconros_zenoh.project.communication import check_places, check_topics, gateway_slots
+from reconros_zenoh.project.mapping_file import CallbackMapping, Mapping
 
 HEAD = """[HwSlot@slot(0:1)]
 Id = 0
@@ -146,11 +146,53 @@ def test_a_fifo_that_cannot_be_is_refused(tmp_path, end, words) -> None:
     assert refused.value.line == 9
 
 
+def test_a_slot_that_is_not_reconfigurable_holds_one_callback(tmp_path) -> None:
+    text = "[HwSlot@fixed(0:1)]\nId = 5\n"
+    read = configuration(tmp_path, text)
+    check_places(read, {"t": CallbackMapping(slots=(5, 0)), "u": CallbackMapping(slots=(6, 0))})
+    with pytest.raises(
+        FileError, match=r"fixed\(1\) \(Id 6\) is not reconfigurable, but t and u are mapped to it"
+    ) as refused:
+        check_places(read, {"t": CallbackMapping(slots=(6,)), "u": CallbackMapping(slots=(6, 0))})
+    assert refused.value.line == 9
+
+
 def test_a_gateway_shares_its_slot_with_no_callback(tmp_path) -> None:
     read = configuration(tmp_path, HW + THREAD + GATEWAY.format("g", "/a", "/a", "sensor_msgs/Image"))
     check_places(read, {"t": CallbackMapping(slots=(0,))})
     with pytest.raises(
-        FileError, match="gateway g sits in a slot that the callback t is mapped to"
+        FileError, match=r"gateway g has no slot for itself: its Slot names only those of the callback t\."
     ) as refused:
         check_places(read, {"t": CallbackMapping(slots=(0, 1))})
     assert refused.value.line == 15
+
+
+def test_a_gateway_shares_its_slot_with_no_other(tmp_path) -> None:
+    gateways = GATEWAY.format("g", "/a", "/b", "sensor_msgs/Image") + GATEWAY.format(
+        "h", "/c", "/d", "sensor_msgs/Image"
+    )
+    read = configuration(tmp_path, THREAD + gateways)
+    with pytest.raises(FileError, match=r"gateway h has no slot .* only those of the gateway g") as refused:
+        check_places(read, {"t": CallbackMapping(slots=(0,))})
+    assert refused.value.line == 19
+
+
+@pytest.mark.parametrize(("slots", "mapped", "taken"), [("*", (), 1), ("*", (1,), 0), ("0", (), 0)])
+def test_a_gateway_takes_a_slot_that_no_thread_wants_if_it_can(tmp_path, slots, mapped, taken) -> None:
+    gateway = GATEWAY.format("g", "/a", "/b", "sensor_msgs/Image").replace("slot(1)", f"slot({slots})")
+    read = configuration(tmp_path, THREAD + gateway)
+    assert gateway_slots(read, {"t": CallbackMapping(slots=mapped)}) == {"g": taken}
+
+
+def test_a_gateway_whose_slots_are_none_is_refused(tmp_path) -> None:
+    gateway = GATEWAY.format("g", "/a", "/b", "sensor_msgs/Image").replace("slot(1)", "other(*)")
+    with pytest.raises(FileError, match="gateway g has no slot for itself: its Slot names none"):
+        gateway_slots(configuration(tmp_path, gateway), {})
+
+
+def test_without_a_mapping_file_a_gateway_keeps_its_slot(tmp_path) -> None:
+    thread = THREAD.replace("slot(0)", "slot(*)")
+    read = configuration(tmp_path, thread + GATEWAY.format("g", "/a", "/b", "sensor_msgs/Image"))
+    mapping = Mapping.default(read)
+    assert mapping.callbacks["t"].slots == (0,)
+    check_places(read, mapping.callbacks)

@@ -46,7 +46,8 @@ def test_a_mapping(tmp_path: Path) -> None:
 
 
 def test_hardware_workers(tmp_path: Path) -> None:
-    assert read(tmp_path, "hardware_workers = 1\n" + GOOD).hardware_workers == 1
+    one_slot = GOOD.replace("slots = [2, 3]", "slots = [2]").replace("slots = [3]\n", "")
+    assert read(tmp_path, "hardware_workers = 1\n" + one_slot).hardware_workers == 1
 
 
 def test_the_standard_executor_has_no_hardware_workers(tmp_path: Path) -> None:
@@ -65,6 +66,7 @@ def test_without_a_file_what_can_be_in_hardware_is(tmp_path: Path) -> None:
         "[ReconosThread@both]\nSlot = s(*), fixed(0)\nHwSource = hls\nSwSource = c\n"
         "[ReconosThread@soft]\nSlot = s(*)\nSwSource = c\n"
         "[ReconosThread@static]\nSlot = fixed(0)\nHwSource = hls\n"
+        "[ReconosThread@late]\nSlot = fixed(0)\nHwSource = hls\n"
         "[ReconosThread@nowhere]\nHwSource = hls\n",
         encoding="utf-8",
     )
@@ -72,11 +74,12 @@ def test_without_a_file_what_can_be_in_hardware_is(tmp_path: Path) -> None:
         name="default",
         executor="reconros",
         software_workers=2,
-        hardware_workers=2,
+        hardware_workers=3,
         callbacks={
             "both": CallbackMapping(slots=(4, 5)),
             "soft": CallbackMapping(software=True),
-            "static": CallbackMapping(software=True),
+            "static": CallbackMapping(slots=(9,)),
+            "late": CallbackMapping(software=True),
             "nowhere": CallbackMapping(software=True),
         },
     )
@@ -97,10 +100,10 @@ MISTAKES = {
     "slot that is no number": (GOOD.replace("[2, 3]", '["RS2"]'), 5, "valid integer"),
     "unknown callback": (GOOD.replace("sobel", "sobol"), 4, "'sobol'. Its callbacks: sobel, hash."),
     "unknown slot": (GOOD.replace("[2, 3]", "[2, 4]"), 5, "unknown slot 4. Known slots: 2, 3."),
-    "slot without a bitstream": (
+    "slot that it is not built for": (
         GOOD.replace("[3]", "[2, 3]"),
         9,
-        "slot 2, for which its thread has no bitstream. It has bitstreams for: 3;",
+        "slot 2, which its thread is not built for. It is built for: 3;",
     ),
     "no place": (GOOD.replace("slots = [2, 3]", "software = false"), 4, "no place"),
     "callback not mapped": (
@@ -110,6 +113,21 @@ MISTAKES = {
     ),
     "hardware under the standard executor": (GOOD.replace("reconros", "standard"), 5, "knows only software"),
     "no software workers": (GOOD.replace("= 2", "= 0"), 8, "0 software workers"),
+    "more hardware workers than slots": (
+        "hardware_workers = 3\n" + GOOD,
+        1,
+        "3 hardware workers, but the project has 2 slots",
+    ),
+    "hardware workers under the standard executor": (
+        'hardware_workers = 1\nexecutor = "standard"\n' + GOOD.split("\n", 1)[1],
+        1,
+        "standard executor has no hardware workers",
+    ),
+    "slot that no worker serves": (
+        "hardware_workers = 1\n" + GOOD,
+        6,
+        "sobel is mapped to slot 3, which no hardware worker serves; they serve 2.",
+    ),
     "no hardware workers": ("hardware_workers = 0\n" + GOOD, 6, "0 hardware workers"),
 }
 

@@ -27,6 +27,8 @@ def start(folder: Path) -> None:
 
 REGISTER = '    app.register("count", "timer", software=count.software, hardware=count.hardware)\n'
 
+GATEWAY = "[ROSGateway@bridge]\nSlot = more(0)\nHWTopic = /a\nSWTopic = /b\nMsgType = blink_msgs/Cuont\n"
+
 # The file that is changed, what is replaced by what, the file and line that must be named, and what is said.
 MISTAKES = {
     "syntax of main.py": ("main.py", "def main(app):", "def main(app:", "main.py:6", "SyntaxError"),
@@ -79,6 +81,20 @@ MISTAKES = {
     ),
     "no hardware": ("main.py", ", hardware=count.hardware", "", "main.py:8", "mapped to hardware, but no"),
     "no spin": ("main.py", "    app.spin()\n", "", "main.py", "does not call app.spin()"),
+    "callback after spin": (
+        "main.py",
+        "    app.spin()\n",
+        f"    app.spin()\n{REGISTER}",
+        "main.py:10",
+        "'count' is added to an executor that spins already",
+    ),
+    "second spin": (
+        "main.py",
+        "    app.spin()\n",
+        "    app.spin()\n    app.spin()\n",
+        "main.py:10",
+        "the executor spins already",
+    ),
     "spin without a callback": ("main.py", REGISTER, "", "main.py:8", "without a callback"),
     "callback that is not in build.cfg": (
         "main.py",
@@ -93,6 +109,27 @@ MISTAKES = {
         "[ReconosThread@idle]\nSwSource = c\n[ReconosThread@count]",
         "build.cfg:24",
         "adds no callback 'idle'",
+    ),
+    "type that nobody defines": (
+        "build.cfg",
+        "msg, Count",
+        "msg, Cuont",
+        "build.cfg:22",
+        "pub: The type 'blink_msgs/msg/Cuont' is not known; similar are blink_msgs/msg/Count",
+    ),
+    "type of a gateway that nobody defines": (
+        "build.cfg",
+        "[ResourceGroup@count]",
+        f"[HwSlot@more(0:0)]\nId = 1\n{GATEWAY}[ResourceGroup@count]",
+        "build.cfg:20",
+        "bridge: The type 'blink_msgs/msg/Cuont' is not known",
+    ),
+    "more workers than slots": (
+        "mappings/hardware.toml",
+        "software_workers = 2",
+        "software_workers = 2\nhardware_workers = 2",
+        "mappings/hardware.toml:3",
+        "2 hardware workers, but the project has 1 slots",
     ),
     "syntax of a message": (
         "msg/blink_msgs/msg/Count.msg",
@@ -197,4 +234,18 @@ def test_without_mapping_files_the_places_are_checked_too(tmp_path: Path) -> Non
         text.replace('node, count_msg, "/count"', "node, blink_msgs/Count, /count, hw"), encoding="utf-8"
     )
     with pytest.raises(FileError, match=r"build\.cfg:22: The callback count is mapped to software"):
+        start(folder)
+
+
+def test_a_service_whose_name_ros_does_not_allow_is_named_with_its_line(tmp_path: Path) -> None:
+    folder = tmp_path / "blink"
+    new_project(folder)
+    declared = "flip_msg = rossrvmsg, std_srvs, srv, SetBool\nflip = rossrvc, node, flip_msg, /1st\n"
+    for file, old, new in (
+        ("build.cfg", "[ReconosThread", f"{declared}[ReconosThread"),
+        ("main.py", "    app.spin", '    app.client("count", "flip")\n    app.spin'),
+    ):
+        text = (folder / file).read_text(encoding="utf-8")
+        (folder / file).write_text(text.replace(old, new), encoding="utf-8")
+    with pytest.raises(FileError, match=r"build\.cfg:25: .*'/1st' has a part that begins with a digit"):
         start(folder)

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
+from reconros_zenoh.errors import UsageError
 from reconros_zenoh.ros.qos import INFINITE_NS, Durability, History, Liveliness, QosProfile, Reliability
 
 durations = st.integers(0, INFINITE_NS) | st.just(INFINITE_NS)
@@ -43,6 +46,42 @@ GOLDEN = [
 def test_golden(profile: QosProfile, text: str) -> None:
     assert profile.encode() == text
     assert QosProfile.decode(text) == profile
+
+
+def test_words() -> None:
+    assert QosProfile.of_words({}) == QosProfile()
+    assert QosProfile().words() == {
+        "reliability": "reliable",
+        "durability": "volatile",
+        "history": "keep_last",
+        "depth": 10,
+    }
+
+
+@given(profiles)
+def test_words_say_what_they_are_said_of(profile: QosProfile) -> None:
+    assume(0 < profile.depth < 2**31)
+    again = QosProfile.of_words(profile.words())
+    assert again == QosProfile(profile.reliability, profile.durability, profile.history, profile.depth)
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        ({"reliability": "yes"}, "reliability is 'yes'. Write reliable or best_effort."),
+        ({"history": 1}, "history is 1. Write keep_last or keep_all."),
+        ({"depth": 0}, "depth is 0. Write a number from 1 to 2147483647."),
+        ({"depth": 2**31}, "depth is 2147483648."),
+        ({"depth": "10"}, "depth is '10'."),
+        (
+            {"lifespan": 5},
+            "there is no QoS policy 'lifespan'. Known: reliability, durability, history, depth.",
+        ),
+    ],
+)
+def test_words_that_say_nothing(words: dict[str, str | int], says: str) -> None:
+    with pytest.raises(UsageError, match=f"^{re.escape(says)}"):
+        QosProfile.of_words(words)
 
 
 def test_fields_that_are_spelled_out_may_be_defaults() -> None:

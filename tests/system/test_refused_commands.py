@@ -176,3 +176,21 @@ def test_a_damaged_bitstream(network: Network, tmp_path: Path) -> None:
         tmp_path,
         says=(f"{damaged}: is damaged", "`reconros build`"),
     )
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        (
+            ("--hmt", "/a", "--type", "std_msgs/UInt32", "--qos-history", "all"),
+            "history is 'all'. Write keep",
+        ),
+        (
+            ("--hmt", "/a", "--type", "std_msgs/UInt32", "--qos-depth", "0"),
+            "depth is 0. Write a number from 1",
+        ),
+        (("--qos-depth", "5"), "Add --hmt TOPIC"),
+    ],
+)
+def test_a_qos_that_no_gateway_can_have(options: tuple[str, ...], says: str) -> None:
+    assert_refused("gateway", *options, says=(says,))
