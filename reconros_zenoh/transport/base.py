@@ -54,7 +54,7 @@ class Request(Protocol):
         """The attachment it was sent with."""
 
     def read(self) -> memoryview:
-        """Copy the payload out of the transport, as a `Sample` has it; to be called once, before the reply."""
+        """Copy the payload out of the transport, as a `Sample` has it; once, before the reply."""
 
     def reply(self, parts: Parts, attachment: bytes | None) -> None:
         """Answer it; without effect when the client no longer waits."""
