@@ -9,12 +9,11 @@ import typer
 
 from reconros_zenoh.board.profile import read_profile
 from reconros_zenoh.cli.console import wide_console
-from reconros_zenoh.cli.experiment import MAPPINGS, plan, run
+from reconros_zenoh.cli.experiment import MAPPINGS, plan, run, show
 from reconros_zenoh.cli.options import ClockName, Out
 from reconros_zenoh.cli.progress import run_bar
 from reconros_zenoh.experiments.ablation import ablate, runs_of_ablation
 from reconros_zenoh.experiments.roundtrip import all_right
-from reconros_zenoh.measure.compare import print_tables
 from reconros_zenoh.measure.report import write_report
 from reconros_zenoh.measure.run import load_run
 
@@ -36,7 +35,7 @@ def demo(
     for clock, requests in ((ClockName.WALL, wall_requests), (ClockName.VIRTUAL, virtual_requests)):
         planned = plan(clock, MAPPINGS, requests, 0, out, _PROFILE)
         experiment = run(planned, quiet=False)
-        print_tables(console, experiment)
+        show(console, experiment)
         if experiment["interrupted"]:
             print(f"records and experiment.json are in {planned.folder}")
             raise typer.Exit(130)

@@ -45,7 +45,7 @@ def findings(experiment: Mapping[str, Any]) -> list[Finding]:
     }:
         found.append(_real_board(errors))
     found.append(_losses(cells.values()))
-    found.append(_host(experiment))
+    found.append(host_finding(experiment))
     return found
 
 
@@ -94,7 +94,8 @@ def _losses(cells: Iterable[Mapping[str, int]]) -> Finding:
     return Finding("requests", f"all {answers} were answered, and every answer was right.")
 
 
-def _host(experiment: Mapping[str, Any]) -> Finding:
+def host_finding(experiment: Mapping[str, Any]) -> Finding:
+    """Return whether the host was fast enough for the model."""
     if experiment["clock"] == "virtual":
         return Finding(
             "host", "time is virtual: the speed of the computer that ran this has no part in the figures."

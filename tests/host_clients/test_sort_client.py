@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from host_clients.closed_loop import ClosedLoop
@@ -9,9 +11,11 @@ from host_clients.suite import exchange
 from reconros_zenoh.clock.virtual import VirtualEnvironment
 from reconros_zenoh.measure.record import RoundTrip
 from reconros_zenoh.rmw.node import Context
-from reconros_zenoh.rmw.received import Received
 from reconros_zenoh.ros.types import TypeRegistry
 from reconros_zenoh.transport.simulated import SimulatedNetwork
+
+if TYPE_CHECKING:
+    from reconros_zenoh.rmw.received import Received
 
 SECOND_NS = 10**9
 
