@@ -26,9 +26,10 @@ def demo(
     wall_requests: Annotated[int, typer.Option(min=1, help="Requests per client in wall time.")] = 100,
     virtual_requests: Annotated[int, typer.Option(min=1, help="Requests per client in virtual time.")] = 1000,
 ) -> None:
-    """Run the round-trip experiment in wall time, then in virtual time, and write a report.
+    """Run the round-trip experiment in both clocks; write a report.
 
-    The report also says what each mechanism of the board model is worth: runs in virtual time without it.
+    First in wall time, then in virtual time. The report also says what each mechanism of the board model is
+    worth: runs in virtual time without it.
     """
     console = wide_console()
     experiments = []

@@ -47,10 +47,11 @@ def design(
     ] = False,
     as_json: AsJson = False,
 ) -> None:
-    """Section IV: /filter and /inv_kinematics in one reconfigurable slot, and in two; writes report.html.
+    """Section IV: the design example, with one slot or two.
 
-    Exit status 0 only if pictures and servo indices came, and all that came were right. Ctrl-C keeps what
-    was measured.
+    /filter and /inv_kinematics share a reconfigurable slot, then have one each. Writes report.html. Exit
+    status 0 only if pictures and servo indices came, and all that came were right. Ctrl-C keeps what was
+    measured.
     """
     from reconros_zenoh.experiments.design import (
         REPORT,

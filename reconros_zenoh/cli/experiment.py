@@ -59,9 +59,10 @@ def roundtrip(
     profile: Profile = "miniitx-zynq7100",
     as_json: AsJson = False,
 ) -> None:
-    """Section V-C: five clients against one board, under each mapping; beside the real board's round trips.
+    """Section V-C: round trips of five clients.
 
-    Writes the records, experiment.json and roundtrips.png, the histograms of Fig. 6.
+    Under each mapping, beside those of the real board. Writes the records, experiment.json and
+    roundtrips.png, the histograms of Fig. 6.
 
     Exit status 0 only if every answer was right and nothing was lost.
     """

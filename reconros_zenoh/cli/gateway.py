@@ -38,9 +38,10 @@ def gateway(
     domain: Domain = 0,
     as_json: AsJson = False,
 ) -> None:
-    """List the gateways of a board, or add one between a hardware-mapped and a software-mapped topic.
+    """List the gateways of a board, or add one.
 
-    Exit status 2 when one of the topics has a gateway already or another type.
+    A gateway connects a hardware-mapped and a software-mapped topic. Exit status 2 when one of the topics has
+    a gateway already or another type.
     """
     from reconros_zenoh.board.gateway_control import ask_gateways, check_type
     from reconros_zenoh.project.type_names import inline_message_type

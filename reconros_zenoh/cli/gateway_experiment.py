@@ -49,10 +49,11 @@ def gateway(
     out: Out = Path("results/gateway"),
     as_json: AsJson = False,
 ) -> None:
-    """One publisher, 2 to 8 subscribers in hardware and one in software: on an SMT, and with a gateway.
+    """Section 4 of the gateways paper: what a gateway is worth.
 
-    Every subscriber checks number and CRC of what it got. The profile native models nothing: real bytes
-    between real processes, publisher and subscriber in software.
+    One publisher, 2 to 8 subscribers in hardware and one in software, on an SMT and with a gateway. Every
+    subscriber checks number and CRC of what it got. The profile native models nothing: real bytes between
+    real processes, publisher and subscriber in software.
     """
     from reconros_zenoh.board.profile import read_profile
     from reconros_zenoh.experiments.gateway import PUBLISHERS, measure_gateway

@@ -44,7 +44,7 @@ def hist(
     ] = False,
     bins: Annotated[int, typer.Option(min=1, max=1000, metavar="N", help="Number of bins.")] = 20,
 ) -> None:
-    """Show the distribution of round-trip times: a histogram and percentiles for each record.
+    """Show a histogram and percentiles of each record of times.
 
     All values of a file count: no warm-up is dropped. The bins run from the 0.5th to the 97.5th percentile;
     the number of values outside is shown.

@@ -43,14 +43,14 @@ def simulate(
     ] = None,
     seed: Annotated[
         int | None,
-        typer.Option(help="Seed of all boards and clients.", show_default="those of the file"),
+        typer.Option(min=0, help="Seed of all boards and clients.", show_default="those of the file"),
     ] = None,
     out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for the records.")] = Path(
         "results/simulate"
     ),
     as_json: AsJson = False,
 ) -> None:
-    """Run a deployment, the very file that `up` runs, in one process in virtual time.
+    """Run the Compose file of `up` in virtual time, in one process.
 
     The same seed gives the same records, bit for bit. Exit status 0 only if every answer was right and
     nothing was lost. Ctrl-C keeps what was measured.

@@ -36,9 +36,10 @@ def callbacks(
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Table I: each callback alone on the board, in hardware and in software, beside the paper's times.
+    """Table I: the time of each callback alone.
 
-    In wall time the real times and those of this host's own kernels stand beside it.
+    In hardware and in software, beside the paper's. In wall time the real times and those of this host's own
+    kernels stand beside it.
     """
     from reconros_zenoh.board.profile import read_profile
     from reconros_zenoh.experiments.callbacks import PLACES, TABLE_I, measure_callbacks
@@ -68,7 +69,10 @@ def reconfiguration(
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Table II: resources, bitstreams and reconfiguration times of the slots, beside the paper's."""
+    """Table II: reconfiguration times of the slots.
+
+    Resources, bitstream sizes and times, beside the paper's.
+    """
     from reconros_zenoh.board.profile import read_profile
     from reconros_zenoh.experiments.reconfiguration import TABLE_II, measure_reconfiguration
 

@@ -1,0 +1,53 @@
+"""The command line as a whole: its help, its options, its end."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import pytest
+from typer.testing import CliRunner
+
+from reconros_zenoh.cli.main import _VERBS, _application
+
+application = _application(list(_VERBS))
+
+
+@pytest.mark.parametrize("group", [(), ("experiment",)])
+def test_the_list_of_commands_cuts_no_sentence(group: tuple[str, ...]) -> None:
+    shown = CliRunner().invoke(application, [*group, "--help"], env={"COLUMNS": "78"}).stdout
+    lines = shown.partition("Commands:\n")[2].splitlines()
+    assert len(lines) >= 5
+    assert [line for line in lines if not line.endswith(".") or line.endswith("..")] == []
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        "experiment roundtrip",
+        "experiment design",
+        "calibrate --profile native --data data --out profile.toml",
+        "simulate -f file.yaml",
+        "board",
+        "client sort",
+        "run project",
+    ],
+)
+def test_a_negative_seed_is_refused(command: str) -> None:
+    done = CliRunner().invoke(application, [*command.split(), "--seed", "-1"])
+    assert done.exit_code == 2
+    assert "'--seed'" in done.stderr
+    assert "greater than or equal to 0" in done.stderr
+
+
+def test_a_signal_while_a_verb_is_imported_ends_it_quietly() -> None:
+    # The import itself is too short to be hit.
+    program = """
+import reconros_zenoh.cli.main as cli
+def _application(verbs):
+    raise KeyboardInterrupt
+cli._application = _application
+cli.main()
+"""
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, timeout=120, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (130, b"", b"")
