@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
+from rich.text import Text
 
 from reconros_zenoh.cli.console import wide_console
 from reconros_zenoh.cli.options import AsJson, ClockName, Out, Profile
@@ -107,11 +108,14 @@ def _write(out: Path, result: dict[str, Any]) -> list[Path]:
 def _print(console: Console, result: dict[str, Any]) -> None:
     for publisher in dict.fromkeys(cell["publisher"] for cell in result["cells"]):
         table = Table(
-            "kB", "subscribers", "SMT", "gateway", "speedup", "SMT", "gateway", "speedup",
-            box=SIMPLE_HEAD, title=f"from {publisher}: largest time to hardware, and time to software [ms]",
-        )  # fmt: skip
-        for column in table.columns:
-            column.justify = "right"
+            title=Text(f"from {publisher}: ms to the slowest subscriber in HW, and in SW", "bold"),
+            title_justify="left",
+            box=SIMPLE_HEAD,
+            show_edge=False,
+            padding=(0, 1, 0, 0),
+        )
+        for column in ("kB", "subscribers", *_to("HW"), *_to("SW")):
+            table.add_column(column, justify="right", vertical="bottom", no_wrap=True)
         for cell in result["cells"]:
             if cell["publisher"] == publisher:
                 table.add_row(
@@ -121,6 +125,7 @@ def _print(console: Console, result: dict[str, Any]) -> None:
                     *_three(cell, "sw_ms", "speedup_sw"),
                 )
         console.print(table)
+        console.print()
     for anchor in result["anchors"]:
         console.print(
             f"{anchor['name']}: speedup {anchor['ours']:.2f}, paper {anchor['paper']:g} "
@@ -135,6 +140,10 @@ def _print(console: Console, result: dict[str, Any]) -> None:
         console.print(line)
 
 
+def _to(side: str) -> Iterable[str]:
+    return f"to {side}\nSMT", "gateway", "speedup"
+
+
 def _three(cell: dict[str, Any], time: str, speedup: str) -> Iterable[str]:
     return f"{cell['smt'][time]:.3f}", f"{cell['gateway'][time]:.3f}", f"{cell[speedup]:.2f}"
 
@@ -147,7 +156,9 @@ def _sizes(text: str) -> list[int]:
         unit = next((unit for unit in units if word.strip().endswith(unit)), "")
         number = word.strip().removesuffix(unit)
         if not (unit and number.isascii() and number.isdigit() and int(number)):
-            raise UsageError(f"{word!r} is no message size. Write for example --sizes 10kB,1MB.")
+            raise UsageError(
+                f"{word!r} is no message size. Write whole numbers of B, kB or MB, as in --sizes 10kB,1MB."
+            )
         sizes.append(int(number) * units[unit])
     return sizes
 

@@ -173,8 +173,11 @@ def test_a_folder_that_cannot_be_written_is_refused_before_anything_is_measured(
 
 
 def test_the_command_prints_a_table(tmp_path) -> None:
-    result = run("--sizes", "10kB", "--publisher", "software", "--out", str(tmp_path))
+    result = run("--sizes", "10kB,10MB", "--publisher", "software", "--out", str(tmp_path))
     assert "from software" in result.stdout
+    lines = [line.split() for line in result.stdout.splitlines()]
+    assert ["to", "HW", "to", "SW"] in lines
+    assert ["kB", "subscribers", "SMT", "gateway", "speedup", "SMT", "gateway", "speedup"] in lines
     assert "from hardware" not in result.stdout
     assert "software to software, smallest: speedup 1.06, paper 1.06" in result.stdout
     assert "…" not in result.stdout
