@@ -46,8 +46,8 @@ def hist(
 ) -> None:
     """Show a histogram and percentiles of each record of times.
 
-    All values of a file count: no warm-up is dropped. The bins run from the 0.5th to the 97.5th percentile;
-    the number of values outside is shown.
+    All values of a file count: no warm-up is dropped. The bins run from the 0.5th to the 97.5th percentile
+    (over all of fewer than 40 values); the number of values outside is shown.
     """
     entries = _load(paths)
     pairs = [(entry, None) for entry in entries] if compare is None else _pair(entries, compare)
