@@ -27,6 +27,7 @@ from reconros_zenoh.experiments.gateway import (
     measure_gateway,
     setup_mapping,
 )
+from reconros_zenoh.measure.gateway_plots import transmission_figure
 from reconros_zenoh.project.loader import load_project
 from reconros_zenoh.transport.simulated import SimulatedNetwork
 
@@ -181,6 +182,16 @@ def test_the_command_prints_a_table(tmp_path) -> None:
     assert "from hardware" not in result.stdout
     assert "software to software, smallest: speedup 1.06, paper 1.06" in result.stdout
     assert "…" not in result.stdout
+
+
+def test_points_of_one_size_tell_the_number_of_subscribers() -> None:
+    figure = transmission_figure(
+        [cell for cell in all_cells()["cells"] if cell["size"] == 10_000], "hardware"
+    )
+    markers = {line.get_marker() for line in figure.axes[0].get_lines()}
+    shown = {handle.get_marker() for handle in figure.legends[0].legend_handles}
+    assert len(markers) == 3
+    assert markers <= shown
 
 
 @pytest.mark.parametrize(
