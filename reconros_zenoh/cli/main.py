@@ -55,7 +55,7 @@ def main() -> None:
     # A verb imports what it needs itself: the others' imports would double its start.
     given = sys.argv[1] if len(sys.argv) > 1 else ""
     try:
-        _application([given] if given in _VERBS else list(_VERBS))()
+        _application([given] if given in _VERBS else list(_VERBS))(prog_name="reconros")
     except KeyboardInterrupt:
         sys.exit(130)
     except (UsageError, TransportError) as error:

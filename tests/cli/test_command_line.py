@@ -51,3 +51,17 @@ cli.main()
 """
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, timeout=120, check=False)
     assert (done.returncode, done.stdout, done.stderr) == (130, b"", b"")
+
+
+@pytest.mark.parametrize(
+    ("module", "usage"),
+    [
+        ("board_daemon", "reconros board [OPTIONS] [project]"),
+        ("host_clients", "reconros client [OPTIONS] {name}"),
+        ("reconros_zenoh", "reconros [OPTIONS] COMMAND [ARGS]..."),
+    ],
+)
+def test_a_package_that_is_run_says_how_it_is_called(module: str, usage: str) -> None:
+    command = [sys.executable, "-m", module, "--help"]
+    done = subprocess.run(command, capture_output=True, timeout=120, check=True, text=True)
+    assert done.stdout.startswith(f"Usage: {usage}\n")
