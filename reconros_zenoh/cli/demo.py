@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from reconros_zenoh.board.profile import read_profile
-from reconros_zenoh.cli.console import wide_console
+from reconros_zenoh.cli.console import interrupted, wide_console
 from reconros_zenoh.cli.experiment import MAPPINGS, plan, run, show
 from reconros_zenoh.cli.options import ClockName, Out
 from reconros_zenoh.cli.progress import run_bar
@@ -39,7 +39,7 @@ def demo(
         show(console, experiment)
         if experiment["interrupted"]:
             print(f"records and experiment.json are in {planned.folder}")
-            raise typer.Exit(130)
+            raise interrupted(quiet=False, measured=bool(experiment["mappings"]))
         experiments.append(experiment)
     with run_bar("what each mechanism is worth", runs_of_ablation(planned.mappings), quiet=False) as advance:
         ablation = ablate(read_profile(_PROFILE), planned.mappings, _ABLATION_REQUESTS, advance)

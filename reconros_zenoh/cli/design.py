@@ -12,7 +12,7 @@ from rich.console import Console
 from rich.table import Table
 
 from reconros_zenoh.board.profile import read_profile
-from reconros_zenoh.cli.console import wide_console
+from reconros_zenoh.cli.console import interrupted, wide_console
 from reconros_zenoh.cli.options import AsJson, ClockName, Out, Profile, Seed
 from reconros_zenoh.cli.progress import run_bar
 from reconros_zenoh.errors import UsageError
@@ -102,9 +102,7 @@ def design(
         _print_table(wide_console(), variants)
         print(f"report: {plan.folder / REPORT}")
     if interruption.happened:
-        if not as_json:
-            print(f"interrupted {'before its end' if variants else 'before anything was measured'}")
-        raise typer.Exit(130)
+        raise interrupted(quiet=as_json, measured=bool(variants))
     raise typer.Exit(0 if all_right(experiment) else 1)
 
 

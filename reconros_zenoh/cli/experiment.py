@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.text import Text
 
-from reconros_zenoh.cli.console import wide_console
+from reconros_zenoh.cli.console import interrupted, wide_console
 from reconros_zenoh.cli.design import design
 from reconros_zenoh.cli.gateway_experiment import gateway
 from reconros_zenoh.cli.options import AsJson, ClockName, Out, Profile, Seed
@@ -78,7 +78,7 @@ def roundtrip(
         if not as_json:
             print(f"drawn to {planned.drawing}")
     if experiment["interrupted"]:
-        raise typer.Exit(130)
+        raise interrupted(quiet=as_json, measured=bool(experiment["mappings"]))
     raise typer.Exit(0 if all_right(experiment) else 1)
 
 

@@ -12,7 +12,7 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table
 from rich.text import Text
 
-from reconros_zenoh.cli.console import wide_console
+from reconros_zenoh.cli.console import interrupted, wide_console
 from reconros_zenoh.cli.options import AsJson, ClockName, Out, Profile
 from reconros_zenoh.cli.progress import run_bar
 from reconros_zenoh.errors import UsageError
@@ -81,7 +81,7 @@ def gateway(
         _print(wide_console(), result)
         print(f"drawings and gateway.json: {', '.join(map(str, paths))}")
     if result["interrupted"]:
-        raise typer.Exit(130)
+        raise interrupted(quiet=as_json, measured=bool(result["cells"]))
 
 
 def _prepare(out: Path) -> None:
@@ -134,8 +134,6 @@ def _print(console: Console, result: dict[str, Any]) -> None:
     lost = sum(cell[variant]["lost"] for cell in result["cells"] for variant in ("smt", "gateway"))
     if lost:
         console.print(f"{lost} messages were lost to somebody and are not in the times")
-    if result["interrupted"]:
-        console.print(f"interrupted after {len(result['cells'])} cells")
     for line in result.get("copies", ()):
         console.print(line)
 

@@ -12,7 +12,7 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table
 from rich.text import Text
 
-from reconros_zenoh.cli.console import wide_console
+from reconros_zenoh.cli.console import interrupted, wide_console
 from reconros_zenoh.cli.options import AsJson, project_prints
 from reconros_zenoh.cli.progress import run_bar
 from reconros_zenoh.cli.service_commands import read_deployment
@@ -74,7 +74,7 @@ def simulate(
         _print_table(wide_console(), summaries)
         print(f"{simulated_s:.1f} s of virtual time; the records are in {out}")
     if interruption.happened:
-        raise typer.Exit(130)
+        raise interrupted(quiet=as_json)
     raise typer.Exit(0 if run.all_right() else 1)
 
 

@@ -11,7 +11,7 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table
 from rich.text import Text
 
-from reconros_zenoh.cli.console import wide_console
+from reconros_zenoh.cli.console import interrupted, wide_console
 from reconros_zenoh.cli.options import AsJson, ClockName, Profile
 from reconros_zenoh.cli.progress import run_bar
 from reconros_zenoh.measure.statistics import format_error, format_ms, format_share
@@ -53,7 +53,7 @@ def callbacks(
     else:
         _show_callbacks(result)
     if result["interrupted"]:
-        raise typer.Exit(130)
+        raise interrupted(quiet=as_json)
 
 
 def reconfiguration(
@@ -87,7 +87,7 @@ def reconfiguration(
         _print_regression(console, result)
         _print_what_if(console, result)
     if result["interrupted"]:
-        raise typer.Exit(130)
+        raise interrupted(quiet=as_json)
 
 
 def _classified(path: Path) -> dict[str, float | int]:

@@ -97,14 +97,14 @@ def test_the_host_is_blamed_where_it_was_too_slow():
     [
         ("wall", 3, "host: 3 times a computation took longer on this computer"),
         ("wall", 0, "host: it kept up with the modelled times: no overrun."),
+        ("wall", None, "host: whether it kept up is not known"),
         ("virtual", 0, ""),
     ],
 )
 def test_the_terminal_says_of_wall_time_whether_the_host_kept_up(clock, overruns, says):
     stream = io.StringIO()
-    show(
-        Console(file=stream, width=80), experiment_of({"a": {"x": constant(2.5)}}, clock, host=host(overruns))
-    )
+    kept = host(overruns) if overruns is not None else {"overruns": 0, "lag_p50_us": None, "lag_p99_us": None}
+    show(Console(file=stream, width=80), experiment_of({"a": {"x": constant(2.5)}}, clock, host=kept))
     said = stream.getvalue().partition("host: ")
     assert " ".join((said[1] + said[2]).split()).startswith(says)
     assert bool(said[1]) == bool(says)
