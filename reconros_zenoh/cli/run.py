@@ -96,6 +96,10 @@ def run(
         print(json.dumps(done))
     else:
         print_status(wide_console(), done)
+        if model.model is None and clock is ClockName.VIRTUAL:
+            print(
+                f"{model.name} models nothing, so nothing took any time. --profile chooses a board that does."
+            )
 
 
 def _profile_of(configuration: BuildConfiguration) -> str:
