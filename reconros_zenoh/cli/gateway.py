@@ -49,8 +49,12 @@ def gateway(
 
     add = None
     if hmt is not None:
+        if message_type is None:
+            raise UsageError(
+                "a gateway needs the type of its messages. Add for example --type sensor_msgs/Image."
+            )
         try:
-            type_name = inline_message_type(message_type or "")
+            type_name = inline_message_type(message_type)
         except ValueError as error:
             raise UsageError(f"{error} Write for example --type sensor_msgs/Image.") from None
         topic = resolve(hmt, "/", "gateway")

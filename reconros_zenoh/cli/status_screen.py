@@ -84,10 +84,10 @@ def _print_spans(console: Console, spans_ms: Mapping[str, Mapping[str, float]]) 
 
 def _print_host(console: Console, host: Mapping[str, Any]) -> None:
     lag = "" if host["lag_p50_us"] is None else f"event loop late by {host['lag_p50_us']:.0f} us (median), "
+    results = "1 result" if host["overruns"] == 1 else f"{host['overruns']} results"
     console.print(
         Text(
-            f"host: {lag}{host['overruns']} results later than modelled "
-            f"({_ms(host['overrun_ms'])} ms in all)",
+            f"host: {lag}{results} later than modelled ({_ms(host['overrun_ms'])} ms in all)",
             style="yellow" if host["overruns"] else "",
         )
     )

@@ -113,8 +113,9 @@ def host_troubles(host: Mapping[str, Any]) -> list[str]:
     """Return in what the host was too slow for the model, a sentence each."""
     troubles = []
     if overruns := host["overruns"]:
+        often = "Once" if overruns == 1 else f"{overruns} times"
         troubles.append(
-            f"{overruns} times a computation took longer on this computer than the board is modelled to need."
+            f"{often} a computation took longer on this computer than the board is modelled to need."
         )
     late_us = host["lag_p99_us"]
     if late_us is not None and late_us > LATE_US:

@@ -9,6 +9,7 @@ import pytest
 from typer.testing import CliRunner
 
 from reconros_zenoh.cli.main import _VERBS, _application
+from reconros_zenoh.errors import UsageError
 
 application = _application(list(_VERBS))
 
@@ -65,3 +66,9 @@ def test_a_package_that_is_run_says_how_it_is_called(module: str, usage: str) ->
     command = [sys.executable, "-m", module, "--help"]
     done = subprocess.run(command, capture_output=True, timeout=120, check=True, text=True)
     assert done.stdout.startswith(f"Usage: {usage}\n")
+
+
+def test_a_gateway_needs_a_type() -> None:
+    done = CliRunner().invoke(application, ["gateway", "--hmt", "/a"])
+    assert isinstance(done.exception, UsageError)
+    assert "Add for example --type sensor_msgs/Image" in str(done.exception)

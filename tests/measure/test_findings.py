@@ -95,6 +95,7 @@ def test_the_host_is_blamed_where_it_was_too_slow():
 @pytest.mark.parametrize(
     ("clock", "overruns", "says"),
     [
+        ("wall", 1, "host: Once a computation took longer on this computer"),
         ("wall", 3, "host: 3 times a computation took longer on this computer"),
         ("wall", 0, "host: it kept up with the modelled times: no overrun."),
         ("wall", None, "host: whether it kept up is not known"),
