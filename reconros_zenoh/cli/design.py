@@ -10,12 +10,14 @@ import typer
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 from reconros_zenoh.board.profile import read_profile
 from reconros_zenoh.cli.console import interrupted, wide_console
 from reconros_zenoh.cli.options import AsJson, ClockName, Out, Profile, Seed
 from reconros_zenoh.cli.progress import run_bar
 from reconros_zenoh.errors import UsageError
+from reconros_zenoh.measure.findings import host_troubles
 from reconros_zenoh.measure.statistics import format_ms
 
 if TYPE_CHECKING:
@@ -121,6 +123,9 @@ def _print_table(console: Console, variants: Mapping[str, Mapping[str, Any]]) ->
             )
     console.print(table)
     console.print("Times in ms.", style="dim")
+    for name, measured in variants.items():
+        for trouble in host_troubles(measured["host"]):
+            console.print(Text(f"host, {name}: {trouble}", style="yellow"))
 
 
 def _cell(value: float | None, key: str) -> str:

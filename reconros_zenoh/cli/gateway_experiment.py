@@ -17,6 +17,7 @@ from reconros_zenoh.cli.options import AsJson, ClockName, Out, Profile
 from reconros_zenoh.cli.progress import run_bar
 from reconros_zenoh.errors import UsageError
 from reconros_zenoh.experiments.provenance import writing
+from reconros_zenoh.measure.findings import host_troubles
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -134,6 +135,8 @@ def _print(console: Console, result: dict[str, Any]) -> None:
     lost = sum(cell[variant]["lost"] for cell in result["cells"] for variant in ("smt", "gateway"))
     if lost:
         console.print(f"{lost} messages were lost to somebody and are not in the times")
+    for trouble in host_troubles(result["host"]):
+        console.print(Text(f"host: {trouble}", style="yellow"))
     for line in result.get("copies", ()):
         console.print(line)
 

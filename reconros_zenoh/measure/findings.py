@@ -117,7 +117,7 @@ def host_troubles(host: Mapping[str, Any]) -> list[str]:
         troubles.append(
             f"{often} a computation took longer on this computer than the board is modelled to need."
         )
-    late_us = host["lag_p99_us"]
+    late_us = host.get("lag_p99_us")
     if late_us is not None and late_us > LATE_US:
         troubles.append(
             f"The board's event loop was up to {late_us / 1e3:.1f} ms late (99th percentile): the shortest "
