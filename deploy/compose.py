@@ -1,7 +1,8 @@
 """Compose files: what the local runner takes from them.
 
 The file is the one that `docker compose` reads. Keys that only mean something in a container are accepted and
-left alone; a key that would change what a service does, and that we do not know, is an error.
+left alone; a key that would change what a service does, and that we do not know, is an error. `volumes` is
+one of these: a local process finds the host's files where they are, not where a container has them mounted.
 """
 
 from __future__ import annotations
@@ -120,7 +121,8 @@ def _check_keys(entries: Mapping[str, Node], known: Iterable[str]) -> None:
         if key not in known and not key.startswith("x-"):
             raise node.error(
                 "is not a key that the local runner supports.",
-                f"Remove it; supported here are {', '.join(sorted(known))} and x-*.",
+                "Correct or remove it, or, if only containers need it, move it to a second file for them "
+                f"(docker compose -f FILE -f SECOND); supported here are {', '.join(sorted(known))} and x-*.",
             )
 
 

@@ -70,7 +70,7 @@ class ClosedLoop:
     def _round_trip(self, index: int) -> Generator[simpy.Event, Any, RoundTrip]:
         asked_ns = self._environment.clock_ns() if self._exchange.asks else self._last_arrival_ns
         deadline_ns = self._environment.now + self._limit_ns
-        self._exchange.ask(index)
+        self._exchange.ask(index, self._limit_ns)
         while True:
             arrival = yield from self._next_arrival(deadline_ns)
             if arrival is None:

@@ -34,8 +34,8 @@ class Exchange(ABC):
         """Declare the endpoints; `on_matching` is told whether somebody serves the requests."""
 
     @abstractmethod
-    def ask(self, index: int) -> None:
-        """Send request number `index`."""
+    def ask(self, index: int, limit_ns: int) -> None:
+        """Send request number `index`; nobody waits longer than `limit_ns` for its answer."""
 
     @abstractmethod
     def is_right(self, index: int, answer: Any) -> bool:
@@ -86,7 +86,7 @@ class TopicExchange(Exchange):
             types.message(self.request_type), self.request_topic, on_matching=on_matching
         )
 
-    def ask(self, index: int) -> None:
+    def ask(self, index: int, limit_ns: int) -> None:  # noqa: ARG002 - what was published cannot be given up
         """Publish request number `index`, counting round and round."""
         place = index % len(self._inputs)
         if place not in self._encoded:

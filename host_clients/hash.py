@@ -42,7 +42,7 @@ class HashExchange(Exchange):
         )
         on_matching(True)
 
-    def ask(self, index: int) -> None:
+    def ask(self, index: int, limit_ns: int) -> None:
         """Do nothing: the board's timer asks."""
 
     def is_right(self, index: int, answer: Any) -> bool:  # noqa: ARG002 - every answer is the same

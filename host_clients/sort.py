@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from reconros_zenoh.ros.types import TypeRegistry
 
 _TYPE = "sorter_msgs/srv/Sort"
-# The loop's own limit is shorter; this one only lets a dead request end.
-_TIMEOUT_NS = 60_000_000_000
 
 
 class SortExchange(Exchange):
@@ -48,9 +46,9 @@ class SortExchange(Exchange):
         self._on_answer = on_answer
         self._client = node.client(service_type, "/sorter", on_matching)
 
-    def ask(self, index: int) -> None:
+    def ask(self, index: int, limit_ns: int) -> None:
         """Call the service."""
-        self._client.call(self._requests[index % len(self._requests)], self._take, _TIMEOUT_NS)
+        self._client.call(self._requests[index % len(self._requests)], self._take, limit_ns)
 
     def is_right(self, index: int, answer: Any) -> bool:
         """Compare all numbers."""

@@ -165,8 +165,10 @@ def ask(transport: Transport, board: str, what: str, question: bytes) -> dict[st
         querier.get((question,), None, replies.put, _ANSWER_NS)
         reply = replies.get()
     if reply is None or reply.payload is None:
+        running = [token.split("/")[1] for token in transport.tokens(alive_key("*"), _ANSWER_NS)]
+        others = f", or name one that runs: {', '.join(running)}" if running else ""
         raise TransportError(
-            f"no board named {board!r} answers. Start it with `reconros board --name {board}`."
+            f"no board named {board!r} answers. Start it with `reconros board --name {board}`{others}."
         )
     answer: dict[str, Any] = msgpack.unpackb(reply.payload)
     if answer.get("version") != VERSION:

@@ -64,7 +64,7 @@ def software_time(profile: Profile, callback: str, timing: Timing | None) -> Exe
         return _NOT_MODELLED
     if timing is not None:
         return _declared(timing, profile.model.cores.clock.hz)
-    return ExecutionTime("table", _table(profile, callback).software.ns)
+    return ExecutionTime("table", _table(profile, callback, "software").software.ns)
 
 
 def hardware_time(profile: Profile, callback: str, timing: Timing | None, clock_hz: float) -> ExecutionTime:
@@ -73,7 +73,7 @@ def hardware_time(profile: Profile, callback: str, timing: Timing | None, clock_
         return _NOT_MODELLED
     if timing is not None:
         return _declared(timing, clock_hz)
-    return ExecutionTime("table", _table(profile, callback).compute.ns)
+    return ExecutionTime("table", _table(profile, callback, "hardware").compute.ns)
 
 
 def cycles_ns(count: int, clock_hz: float) -> int:
@@ -90,13 +90,13 @@ def _declared(timing: Timing, clock_hz: float) -> ExecutionTime:
     return ExecutionTime("native", factor=timing.factor)
 
 
-def _table(profile: Profile, callback: str) -> CallbackSection:
+def _table(profile: Profile, callback: str, side: str) -> CallbackSection:
     assert profile.model is not None
     section = profile.model.callbacks.get(callback)
     if section is None:
         raise UsageError(
             f"profile {profile.name!r} has no times for callback {callback!r}. Add the callback with "
-            f"timing=Cycles(n) or timing=Native(factor), or add a section [model.callbacks.{callback}] to a "
-            "copy of the profile."
+            f"timing=Cycles(n) or timing=Native(factor), in app.register {side}_timing, or add a section "
+            f"[model.callbacks.{callback}] to a copy of the profile."
         )
     return section

@@ -23,7 +23,10 @@ def build(
     ] = "miniitx-zynq7100",
     as_json: AsJson = False,
 ) -> None:
-    """Write a partial bitstream for each callback and each reconfigurable slot it can be built for."""
+    """Write a project's partial bitstreams.
+
+    One for each callback and each reconfigurable slot it can be built for.
+    """
     folder = out or project / "bitstreams"
     with project_prints(as_json=as_json):
         loaded = load_project(project)

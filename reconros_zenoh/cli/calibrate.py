@@ -13,7 +13,7 @@ from rich.text import Text
 
 from reconros_zenoh.board.profile import read_profile
 from reconros_zenoh.cli.console import wide_console
-from reconros_zenoh.cli.options import AsJson
+from reconros_zenoh.cli.options import AsJson, Seed
 from reconros_zenoh.cli.progress import run_bar
 from reconros_zenoh.errors import UsageError
 from reconros_zenoh.experiments.calibration import (
@@ -68,10 +68,13 @@ def calibrate(
     requests: Annotated[
         int, typer.Option(min=20, help="Requests per client and run; more lower the noise.")
     ] = 300,
-    seed: Annotated[int, typer.Option(help="Seed of requests and model.")] = 0,
+    seed: Seed = 0,
     as_json: AsJson = False,
 ) -> None:
-    """Fit the calibrated constants of a profile to measured round trips; all others are held."""
+    """Fit a profile's calibrated constants to measured round trips.
+
+    All other constants are held.
+    """
     start = read_profile(profile)
     source = profile_file(profile)
     constants = calibrated_constants(start)

@@ -44,9 +44,9 @@ def check(
     project: Annotated[Path, typer.Argument(metavar="build.cfg|PROJECT", help="A project file or folder.")],
     as_json: AsJson = False,
 ) -> None:
-    """Read a ReconROS project file and show what it says; exit status 2 when it cannot be used.
+    """Show what a ReconROS project file says.
 
-    What a folder holds in msg/ is read too.
+    What a folder holds in msg/ is read too. Exit status 2 when the project cannot be used.
     """
     path = project / "build.cfg" if project.is_dir() else project
     configuration = read_build_cfg(path)

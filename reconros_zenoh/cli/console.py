@@ -1,7 +1,8 @@
-"""Where the verbs print their tables."""
+"""Where the verbs print their tables, and how they end when they are interrupted."""
 
 from __future__ import annotations
 
+import typer
 from rich.console import Console
 
 _COLUMNS = 80
@@ -16,3 +17,10 @@ def wide_console(columns: int = _COLUMNS) -> Console:
     console = Console()
     console.width = max(console.width, columns)
     return console
+
+
+def interrupted(*, quiet: bool, measured: bool = True) -> typer.Exit:
+    """Return the end of a verb that a signal stopped, status 130; it has said so unless `quiet`."""
+    if not quiet:
+        print(f"interrupted before {'its end' if measured else 'anything was measured'}")
+    return typer.Exit(130)

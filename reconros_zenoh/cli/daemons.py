@@ -47,7 +47,10 @@ def router(
         ),
     ] = ENDPOINT,
 ) -> None:
-    """Run a Zenoh router until Ctrl-C; any rmw_zenoh router serves as well."""
+    """Run a Zenoh router until Ctrl-C.
+
+    Any rmw_zenoh router serves as well.
+    """
     endings = {signal.SIGINT, signal.SIGTERM}
     # `sigwait` only takes signals that are blocked, in Zenoh's threads too.
     signal.pthread_sigmask(signal.SIG_BLOCK, endings)
@@ -109,12 +112,15 @@ def client(
     out: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Record each round trip there.", show_default=False)
     ] = None,
-    seed: Annotated[int, typer.Option(help="Seed of the requests.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the requests.")] = 0,
     group: Group = None,
     members: Members = 1,
     as_json: AsJson = False,
 ) -> None:
-    """Make round trips to a board, one after the other, and check every answer."""
+    """Make round trips to a board and check every answer.
+
+    The next request leaves when the answer to the last one is in.
+    """
     from host_clients.command import make_round_trips
     from host_clients.daemon import ClientOptions
 
@@ -127,7 +133,10 @@ def status(
     router: Router = ENDPOINT,
     as_json: AsJson = False,
 ) -> None:
-    """Show what a board is doing; exit status 2 when it does not answer."""
+    """Show what a board is doing.
+
+    Exit status 2 when it does not answer.
+    """
     with ZenohTransport.open(router) as transport:
         answer = {"router": router} if name == "router" else ask_status(transport, name)
     if as_json:

@@ -8,13 +8,12 @@ from typing import Annotated
 import typer
 
 from reconros_zenoh.board.profile import read_profile
-from reconros_zenoh.cli.console import wide_console
-from reconros_zenoh.cli.experiment import MAPPINGS, plan, run
+from reconros_zenoh.cli.console import interrupted, wide_console
+from reconros_zenoh.cli.experiment import MAPPINGS, plan, run, show
 from reconros_zenoh.cli.options import ClockName, Out
 from reconros_zenoh.cli.progress import run_bar
 from reconros_zenoh.experiments.ablation import ablate, runs_of_ablation
 from reconros_zenoh.experiments.roundtrip import all_right
-from reconros_zenoh.measure.compare import print_tables
 from reconros_zenoh.measure.report import write_report
 from reconros_zenoh.measure.run import load_run
 
@@ -27,19 +26,20 @@ def demo(
     wall_requests: Annotated[int, typer.Option(min=1, help="Requests per client in wall time.")] = 100,
     virtual_requests: Annotated[int, typer.Option(min=1, help="Requests per client in virtual time.")] = 1000,
 ) -> None:
-    """Run the round-trip experiment in wall time, then in virtual time, and write a report.
+    """Run the round-trip experiment in both clocks; write a report.
 
-    The report also says what each mechanism of the board model is worth: runs in virtual time without it.
+    First in wall time, then in virtual time. The report also says what each mechanism of the board model is
+    worth: runs in virtual time without it.
     """
     console = wide_console()
     experiments = []
     for clock, requests in ((ClockName.WALL, wall_requests), (ClockName.VIRTUAL, virtual_requests)):
         planned = plan(clock, MAPPINGS, requests, 0, out, _PROFILE)
         experiment = run(planned, quiet=False)
-        print_tables(console, experiment)
+        show(console, experiment)
         if experiment["interrupted"]:
             print(f"records and experiment.json are in {planned.folder}")
-            raise typer.Exit(130)
+            raise interrupted(quiet=False, measured=bool(experiment["mappings"]))
         experiments.append(experiment)
     with run_bar("what each mechanism is worth", runs_of_ablation(planned.mappings), quiet=False) as advance:
         ablation = ablate(read_profile(_PROFILE), planned.mappings, _ABLATION_REQUESTS, advance)

@@ -10,12 +10,14 @@ import typer
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 from reconros_zenoh.board.profile import read_profile
-from reconros_zenoh.cli.console import wide_console
+from reconros_zenoh.cli.console import interrupted, wide_console
 from reconros_zenoh.cli.options import AsJson, ClockName, Out, Profile, Seed
 from reconros_zenoh.cli.progress import run_bar
 from reconros_zenoh.errors import UsageError
+from reconros_zenoh.measure.findings import host_troubles
 from reconros_zenoh.measure.statistics import format_ms
 
 if TYPE_CHECKING:
@@ -47,10 +49,11 @@ def design(
     ] = False,
     as_json: AsJson = False,
 ) -> None:
-    """Section IV: /filter and /inv_kinematics in one reconfigurable slot, and in two; writes report.html.
+    """Section IV: the design example, with one slot or two.
 
-    Exit status 0 only if pictures and servo indices came, and all that came were right. Ctrl-C keeps what
-    was measured.
+    /filter and /inv_kinematics share a reconfigurable slot, then have one each. Writes report.html. Exit
+    status 0 only if pictures and servo indices came, and all that came were right. Ctrl-C keeps what was
+    measured.
     """
     from reconros_zenoh.experiments.design import (
         REPORT,
@@ -101,9 +104,7 @@ def design(
         _print_table(wide_console(), variants)
         print(f"report: {plan.folder / REPORT}")
     if interruption.happened:
-        if not as_json:
-            print(f"interrupted {'before its end' if variants else 'before anything was measured'}")
-        raise typer.Exit(130)
+        raise interrupted(quiet=as_json, measured=bool(variants))
     raise typer.Exit(0 if all_right(experiment) else 1)
 
 
@@ -122,6 +123,9 @@ def _print_table(console: Console, variants: Mapping[str, Mapping[str, Any]]) ->
             )
     console.print(table)
     console.print("Times in ms.", style="dim")
+    for name, measured in variants.items():
+        for trouble in host_troubles(measured["host"]):
+            console.print(Text(f"host, {name}: {trouble}", style="yellow"))
 
 
 def _cell(value: float | None, key: str) -> str:

@@ -26,7 +26,10 @@ def camera(
     group: Group = None,
     members: Members = 1,
 ) -> None:
-    """Publish a moving test picture on /image_raw, and end 2 s after the last."""
+    """Publish a moving test picture on /image_raw.
+
+    It ends 2 s after the last picture.
+    """
     from host_clients.camera import CameraOptions
     from host_clients.desktop import run_camera
 
@@ -62,7 +65,10 @@ def viewer(
     group: Group = None,
     members: Members = 1,
 ) -> None:
-    """Take the pictures of /image_filtered and check them, until Ctrl-C; measure the control loop as well."""
+    """Check the pictures of /image_filtered until Ctrl-C.
+
+    It measures the control loop as well.
+    """
     from host_clients.desktop import ViewerOptions, run_viewer
 
     def tell(url: str | None) -> None:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from rich.text import Text
 
-from reconros_zenoh.cli.console import wide_console
+from reconros_zenoh.cli.console import interrupted, wide_console
 from reconros_zenoh.cli.design import design
 from reconros_zenoh.cli.gateway_experiment import gateway
 from reconros_zenoh.cli.options import AsJson, ClockName, Out, Profile, Seed
@@ -25,8 +26,12 @@ from reconros_zenoh.experiments.roundtrip import (
     prepare,
 )
 from reconros_zenoh.measure.compare import print_tables
+from reconros_zenoh.measure.findings import host_finding
 from reconros_zenoh.measure.plots import write_grid
 from reconros_zenoh.measure.run import load_run
+
+if TYPE_CHECKING:
+    from rich.console import Console
 
 app = typer.Typer(help="Run an experiment of the papers on emulated boards.", no_args_is_help=True)
 app.command("callbacks")(callbacks)
@@ -54,9 +59,10 @@ def roundtrip(
     profile: Profile = "miniitx-zynq7100",
     as_json: AsJson = False,
 ) -> None:
-    """Section V-C: five clients against one board, under each mapping; beside the real board's round trips.
+    """Section V-C: round trips of five clients.
 
-    Writes the records, experiment.json and roundtrips.png, the histograms of Fig. 6.
+    Under each mapping, beside those of the real board. Writes the records, experiment.json and
+    roundtrips.png, the histograms of Fig. 6.
 
     Exit status 0 only if every answer was right and nothing was lost.
     """
@@ -65,14 +71,14 @@ def roundtrip(
     if as_json:
         print(json.dumps(experiment))
     else:
-        print_tables(wide_console(), experiment)
+        show(wide_console(), experiment)
         print(f"records and experiment.json are in {planned.folder}")
     if experiment["mappings"]:
         write_grid(planned.drawing, load_run(planned.folder)[1])
         if not as_json:
             print(f"drawn to {planned.drawing}")
     if experiment["interrupted"]:
-        raise typer.Exit(130)
+        raise interrupted(quiet=as_json, measured=bool(experiment["mappings"]))
     raise typer.Exit(0 if all_right(experiment) else 1)
 
 
@@ -95,6 +101,14 @@ def plan(
             f"profile {profile!r} models nothing, so nothing would take any virtual time. Use --clock wall."
         )
     return Plan(clock.value, named, requests, seed, profile, out)
+
+
+def show(console: Console, experiment: dict[str, Any]) -> None:
+    """Print the experiment's tables, and of wall time whether the host kept up."""
+    print_tables(console, experiment)
+    if experiment["clock"] == "wall":
+        host = host_finding(experiment)
+        console.print(Text(f"host: {host.sentence}", style="yellow" if host.warning else ""))
 
 
 def run(plan: Plan, *, quiet: bool) -> dict[str, Any]:

@@ -59,10 +59,11 @@ def gateway(
     domain: Domain = 0,
     as_json: AsJson = False,
 ) -> None:
-    """List the gateways of a board, or add one between a hardware-mapped and a software-mapped topic.
+    """List the gateways of a board, or add one.
 
-    The QoS is that of its ends on the software-mapped topic. The gateway is loaded into a free slot. Exit
-    status 2 when there is none, or one of the topics has a gateway already or another type.
+    A gateway connects a hardware-mapped and a software-mapped topic. The QoS is that of its ends on the
+    software-mapped one. It is loaded into a free slot. Exit status 2 when there is none, or one of the topics
+    has a gateway already or another type.
     """
     from reconros_zenoh.board.gateway_control import ask_gateways, check_type
     from reconros_zenoh.project.type_names import inline_message_type
@@ -74,8 +75,12 @@ def gateway(
     QosProfile.of_words(qos)
     add: dict[str, Any] | None = None
     if hmt is not None:
+        if message_type is None:
+            raise UsageError(
+                "a gateway needs the type of its messages. Add for example --type sensor_msgs/Image."
+            )
         try:
-            type_name = inline_message_type(message_type or "")
+            type_name = inline_message_type(message_type)
         except ValueError as error:
             raise UsageError(f"{error} Write for example --type sensor_msgs/Image.") from None
         topic = resolve(hmt, "/", "gateway")

@@ -10,12 +10,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
+from rich.text import Text
 
-from reconros_zenoh.cli.console import wide_console
+from reconros_zenoh.cli.console import interrupted, wide_console
 from reconros_zenoh.cli.options import AsJson, ClockName, Out, Profile
 from reconros_zenoh.cli.progress import run_bar
 from reconros_zenoh.errors import UsageError
 from reconros_zenoh.experiments.provenance import writing
+from reconros_zenoh.measure.findings import host_troubles
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -49,10 +51,11 @@ def gateway(
     out: Out = Path("results/gateway"),
     as_json: AsJson = False,
 ) -> None:
-    """One publisher, 2 to 8 subscribers in hardware and one in software: on an SMT, and with a gateway.
+    """Section 4 of the gateways paper: what a gateway is worth.
 
-    Every subscriber checks number and CRC of what it got. The profile native models nothing: real bytes
-    between real processes, publisher and subscriber in software.
+    One publisher, 2 to 8 subscribers in hardware and one in software, on an SMT and with a gateway. Every
+    subscriber checks number and CRC of what it got. The profile native models nothing: real bytes between
+    real processes, publisher and subscriber in software.
     """
     from reconros_zenoh.board.profile import read_profile
     from reconros_zenoh.experiments.gateway import PUBLISHERS, measure_gateway
@@ -79,7 +82,7 @@ def gateway(
         _print(wide_console(), result)
         print(f"drawings and gateway.json: {', '.join(map(str, paths))}")
     if result["interrupted"]:
-        raise typer.Exit(130)
+        raise interrupted(quiet=as_json, measured=bool(result["cells"]))
 
 
 def _prepare(out: Path) -> None:
@@ -106,11 +109,14 @@ def _write(out: Path, result: dict[str, Any]) -> list[Path]:
 def _print(console: Console, result: dict[str, Any]) -> None:
     for publisher in dict.fromkeys(cell["publisher"] for cell in result["cells"]):
         table = Table(
-            "kB", "subscribers", "SMT", "gateway", "speedup", "SMT", "gateway", "speedup",
-            box=SIMPLE_HEAD, title=f"from {publisher}: largest time to hardware, and time to software [ms]",
-        )  # fmt: skip
-        for column in table.columns:
-            column.justify = "right"
+            title=Text(f"from {publisher}: ms to the slowest subscriber in HW, and in SW", "bold"),
+            title_justify="left",
+            box=SIMPLE_HEAD,
+            show_edge=False,
+            padding=(0, 1, 0, 0),
+        )
+        for column in ("kB", "subscribers", *_to("HW"), *_to("SW")):
+            table.add_column(column, justify="right", vertical="bottom", no_wrap=True)
         for cell in result["cells"]:
             if cell["publisher"] == publisher:
                 table.add_row(
@@ -120,6 +126,7 @@ def _print(console: Console, result: dict[str, Any]) -> None:
                     *_three(cell, "sw_ms", "speedup_sw"),
                 )
         console.print(table)
+        console.print()
     for anchor in result["anchors"]:
         console.print(
             f"{anchor['name']}: speedup {anchor['ours']:.2f}, paper {anchor['paper']:g} "
@@ -128,10 +135,14 @@ def _print(console: Console, result: dict[str, Any]) -> None:
     lost = sum(cell[variant]["lost"] for cell in result["cells"] for variant in ("smt", "gateway"))
     if lost:
         console.print(f"{lost} messages were lost to somebody and are not in the times")
-    if result["interrupted"]:
-        console.print(f"interrupted after {len(result['cells'])} cells")
+    for trouble in host_troubles(result["host"]):
+        console.print(Text(f"host: {trouble}", style="yellow"))
     for line in result.get("copies", ()):
         console.print(line)
+
+
+def _to(side: str) -> Iterable[str]:
+    return f"to {side}\nSMT", "gateway", "speedup"
 
 
 def _three(cell: dict[str, Any], time: str, speedup: str) -> Iterable[str]:
@@ -146,7 +157,9 @@ def _sizes(text: str) -> list[int]:
         unit = next((unit for unit in units if word.strip().endswith(unit)), "")
         number = word.strip().removesuffix(unit)
         if not (unit and number.isascii() and number.isdigit() and int(number)):
-            raise UsageError(f"{word!r} is no message size. Write for example --sizes 10kB,1MB.")
+            raise UsageError(
+                f"{word!r} is no message size. Write whole numbers of B, kB or MB, as in --sizes 10kB,1MB."
+            )
         sizes.append(int(number) * units[unit])
     return sizes
 

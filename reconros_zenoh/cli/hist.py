@@ -44,10 +44,10 @@ def hist(
     ] = False,
     bins: Annotated[int, typer.Option(min=1, max=1000, metavar="N", help="Number of bins.")] = 20,
 ) -> None:
-    """Show the distribution of round-trip times: a histogram and percentiles for each record.
+    """Show a histogram and percentiles of each record of times.
 
-    All values of a file count: no warm-up is dropped. The bins run from the 0.5th to the 97.5th percentile;
-    the number of values outside is shown.
+    All values of a file count: no warm-up is dropped. The bins run from the 0.5th to the 97.5th percentile
+    (over all of fewer than 40 values); the number of values outside is shown.
     """
     entries = _load(paths)
     pairs = [(entry, None) for entry in entries] if compare is None else _pair(entries, compare)

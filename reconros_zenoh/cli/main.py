@@ -54,9 +54,8 @@ def main() -> None:
         signal.signal(number, ending)
     # A verb imports what it needs itself: the others' imports would double its start.
     given = sys.argv[1] if len(sys.argv) > 1 else ""
-    application = _application([given] if given in _VERBS else list(_VERBS))
     try:
-        application()
+        _application([given] if given in _VERBS else list(_VERBS))(prog_name="reconros")
     except KeyboardInterrupt:
         sys.exit(130)
     except (UsageError, TransportError) as error:

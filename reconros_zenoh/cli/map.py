@@ -82,7 +82,7 @@ def map_communication(
     domain: Domain = 0,
     as_json: AsJson = False,
 ) -> None:
-    """Find which topics to realise in software, in hardware, and with a gateway between both.
+    """Map topics to software, hardware, or both with a gateway.
 
     The three cases of Mapping and Optimizing, Section 5, and the edges over the boundary before and after.
     """

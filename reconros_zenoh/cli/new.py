@@ -11,7 +11,10 @@ from reconros_zenoh.project.template import new_project
 
 
 def new(name: Annotated[Path, typer.Argument(metavar="NAME", help="The project, and its folder.")]) -> None:
-    """Make a project that runs: one callback, in software and in hardware."""
+    """Make a project that runs.
+
+    It has one callback, in software and in hardware.
+    """
     for path in new_project(name):
         print(path)
     print(f"Try it: reconros run {name} --clock virtual")

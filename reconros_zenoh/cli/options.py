@@ -29,7 +29,7 @@ Profile = Annotated[
     str, typer.Option(metavar="NAME|FILE", help="The kind of board; native models nothing (wall time only).")
 ]
 Out = Annotated[Path, typer.Option(metavar="DIR", help="Folder for the records.")]
-Seed = Annotated[int, typer.Option(help="Seed of requests and model.")]
+Seed = Annotated[int, typer.Option(min=0, help="Seed of requests and model.")]
 Router = Annotated[
     str, typer.Option(metavar="ENDPOINT", envvar="RECONROS_ROUTER", help="The Zenoh router to connect to.")
 ]
@@ -43,7 +43,7 @@ MappingName = Annotated[
     ),
 ]
 BoardName = Annotated[str, typer.Option(help="The board's name in the network.")]
-ModelSeed = Annotated[int, typer.Option(help="Seed of what is random in the model.")]
+ModelSeed = Annotated[int, typer.Option(min=0, help="Seed of what is random in the model.")]
 Group = Annotated[
     str | None, typer.Option(help="Begin together with the others of this group.", show_default=False)
 ]

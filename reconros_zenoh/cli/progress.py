@@ -1,4 +1,7 @@
-"""How far an experiment is: a bar per client on a terminal, lines elsewhere."""
+"""How far an experiment is: bars on a terminal, lines elsewhere.
+
+A terminal without cursor movement (TERM=dumb) is `elsewhere`: bars that cannot be redrawn show nothing.
+"""
 
 from __future__ import annotations
 
@@ -29,7 +32,7 @@ class ExperimentProgress:
             MofNCompleteColumn(),
             TimeElapsedColumn(),
             console=self._console,
-            disable=quiet or not self._console.is_terminal,
+            disable=quiet or not self._console.is_interactive,
         )
         self._tasks = {client: self._bars.add_task(client, total=plan.requests) for client in CLIENTS}
         self._left = 0
@@ -49,26 +52,26 @@ class ExperimentProgress:
             self._left = self._plan.requests * len(CLIENTS)
             for name, task in self._tasks.items():
                 self._bars.reset(task, description=f"{mapping}  {name}")
-            if not self._console.is_terminal:
+            if not self._console.is_interactive:
                 self._console.print(f"{self._plan.clock} time, {mapping}: {self._left} round trips ...")
         self._bars.advance(self._tasks[client])
         self._left -= 1
-        if not self._left and not self._console.is_terminal:
+        if not self._left and not self._console.is_interactive:
             self._console.print(f"{self._plan.clock} time, {mapping}: done")
 
 
 @contextmanager
-def run_bar(what: str, runs: int, *, quiet: bool) -> Iterator[Callable[[], None]]:
+def run_bar(what: str, runs: int, *, quiet: bool, each: str = "runs") -> Iterator[Callable[[], None]]:
     """Show how many of the runs are done while the block runs; it calls what it is given after each."""
     console = Console(stderr=True, quiet=quiet)
-    if not console.is_terminal:
-        console.print(f"{what}: {runs} runs ...")
+    if not console.is_interactive:
+        console.print(f"{what}: {runs} {each} ...")
     with Progress(
         TextColumn("{task.description}"),
         BarColumn(),
         MofNCompleteColumn(),
         TimeElapsedColumn(),
         console=console,
-        disable=quiet or not console.is_terminal,
+        disable=quiet or not console.is_interactive,
     ) as bars:
         yield partial(bars.advance, bars.add_task(what, total=runs))

@@ -67,7 +67,10 @@ def run(
     bitstreams: Bitstreams = None,
     as_json: AsJson = False,
 ) -> None:
-    """Host a project on an emulated board of its TargetBoard, and show at the end what the board has done."""
+    """Run a project on an emulated board of its TargetBoard.
+
+    At the end it shows what the board has done.
+    """
     if seconds is not None and not math.isfinite(seconds):
         raise UsageError(f"--seconds {seconds}: give a number.")
     with project_prints(as_json=as_json):
@@ -93,6 +96,10 @@ def run(
         print(json.dumps(done))
     else:
         print_status(wide_console(), done)
+        if model.model is None and clock is ClockName.VIRTUAL:
+            print(
+                f"{model.name} models nothing, so nothing took any time. --profile chooses a board that does."
+            )
 
 
 def _profile_of(configuration: BuildConfiguration) -> str:

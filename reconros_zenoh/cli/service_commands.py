@@ -133,7 +133,7 @@ def _parse(service: Service, command: Node) -> tuple[str, dict[str, Any]]:
         given = parser.main([*variables, *arguments], f"reconros {verb}", standalone_mode=False)
     except typer.TyperException as error:
         raise command.error(
-            f"cannot be run: {error.format_message()}", f"See `reconros {verb} --help`."
+            f"cannot be run: {error.format_message().removesuffix('.')}.", f"See `reconros {verb} --help`."
         ) from None
     return verb, given
 

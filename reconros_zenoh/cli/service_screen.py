@@ -28,9 +28,9 @@ _READ_INTERVAL_S = 0.1
 class ServiceScreen:
     """Shows the states of the services and, with `logs`, the new lines of their logs.
 
-    On a terminal the states stand below the lines and change in place, elsewhere each change is a line. The
-    logs are read from their files at short intervals: the services write them without us, so that a slow
-    terminal can never hold up an experiment.
+    On a terminal that can redraw, the states stand below the lines and change in place; elsewhere each change
+    is a line. The logs are read from their files at short intervals: the services write them without us, so
+    that a slow terminal can never hold up an experiment.
     """
 
     def __init__(self, console: Console, services: Iterable[str], logs: Path | None) -> None:
@@ -44,7 +44,7 @@ class ServiceScreen:
         self._over = threading.Event()
         self._follower = threading.Thread(target=self._follow, name="follow logs", daemon=True)
         self._live = (
-            Live(console=console, get_renderable=self._status) if console.is_terminal else nullcontext()
+            Live(console=console, get_renderable=self._status) if console.is_interactive else nullcontext()
         )
 
     def __enter__(self) -> Self:
@@ -65,7 +65,7 @@ class ServiceScreen:
             if state in _OVER:
                 self._print_new_lines(service, all_of_it=True)
             self.states[service] = state
-            if not self._console.is_terminal:
+            if not self._console.is_interactive:
                 self._console.print(f"{service}: {state}")
 
     def _follow(self) -> None:

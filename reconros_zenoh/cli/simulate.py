@@ -4,19 +4,17 @@ from __future__ import annotations
 
 import json
 import os
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.box import SIMPLE_HEAD
-from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeElapsedColumn
 from rich.table import Table
 from rich.text import Text
 
-from reconros_zenoh.cli.console import wide_console
+from reconros_zenoh.cli.console import interrupted, wide_console
 from reconros_zenoh.cli.options import AsJson, project_prints
+from reconros_zenoh.cli.progress import run_bar
 from reconros_zenoh.cli.service_commands import read_deployment
 from reconros_zenoh.experiments.deployment import DeploymentRun, prepare
 from reconros_zenoh.experiments.interruption import until_interrupted
@@ -24,6 +22,8 @@ from reconros_zenoh.measure.statistics import format_ms
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
+
+    from rich.console import Console
 
 
 def simulate(
@@ -43,34 +43,27 @@ def simulate(
     ] = None,
     seed: Annotated[
         int | None,
-        typer.Option(help="Seed of all boards and clients.", show_default="those of the file"),
+        typer.Option(min=0, help="Seed of all boards and clients.", show_default="those of the file"),
     ] = None,
     out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for the records.")] = Path(
         "results/simulate"
     ),
     as_json: AsJson = False,
 ) -> None:
-    """Run a deployment, the very file that `up` runs, in one process in virtual time.
+    """Run the Compose file of `up` in virtual time, in one process.
 
     The same seed gives the same records, bit for bit. Exit status 0 only if every answer was right and
     nothing was lost. Ctrl-C keeps what was measured.
     """
     plan = read_deployment(file, os.environ).changed(requests, seed)
     prepare(out)
-    with (
-        project_prints(as_json=as_json),
-        Progress(
-            BarColumn(),
-            MofNCompleteColumn(),
-            TimeElapsedColumn(),
-            console=Console(stderr=True),
-            disable=as_json or not sys.stderr.isatty(),
-        ) as progress,
-    ):
+    with project_prints(as_json=as_json):
         run = DeploymentRun([plan] if boards is None else [plan.clone(number) for number in range(boards)])
-        task = progress.add_task("", total=run.requests)
-        with until_interrupted() as interruption:
-            run.run(lambda: progress.advance(task))
+        with (
+            run_bar("virtual time", run.requests, quiet=as_json, each="requests") as advance,
+            until_interrupted() as interruption,
+        ):
+            run.run(advance)
     run.write_records(out)
     summaries = run.summaries()
     simulated_s = run.simulated_ns / 1e9
@@ -81,7 +74,7 @@ def simulate(
         _print_table(wide_console(), summaries)
         print(f"{simulated_s:.1f} s of virtual time; the records are in {out}")
     if interruption.happened:
-        raise typer.Exit(130)
+        raise interrupted(quiet=as_json)
     raise typer.Exit(0 if run.all_right() else 1)
 
 

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args
 
 from rich.box import SIMPLE_HEAD
 from rich.table import Table
 from rich.text import Text
 
+from reconros_zenoh.board.spans import Stage
+
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
     from rich.console import Console
+
+_CALLBACKS_PER_TABLE = 5
 
 
 def print_status(console: Console, status: Mapping[str, Any]) -> None:
@@ -37,8 +41,8 @@ def print_status(console: Console, status: Mapping[str, Any]) -> None:
                 slot["id"],
                 slot["holds"] or "-",
                 slot["reconfigurations"],
-                _ms(slot["reconfiguration_ms"]),
-                _ms(slot["busy_ms"]),
+                slot["reconfiguration_ms"],
+                slot["busy_ms"],
             )
             for slot in status["slots"]
         ),
@@ -63,20 +67,27 @@ def print_status(console: Console, status: Mapping[str, Any]) -> None:
 
 
 def _print_spans(console: Console, spans_ms: Mapping[str, Mapping[str, float]]) -> None:
-    stages = list(dict.fromkeys(stage for each in spans_ms.values() for stage in each))
-    _print(
-        console,
-        ("mean [ms] of", *stages),
-        ((name, *(_ms(each.get(stage, 0.0)) for stage in stages)) for name, each in spans_ms.items()),
-    )
+    """Print where the time of a message goes, in the order of its way: a column for each callback."""
+    names = list(spans_ms)
+    for first in range(0, len(names), _CALLBACKS_PER_TABLE):
+        shown = [spans_ms[name] for name in names[first : first + _CALLBACKS_PER_TABLE]]
+        stages = [stage for stage in get_args(Stage) if any(stage in each for each in shown)]
+        _print(
+            console,
+            ("mean [ms]", *names[first : first + _CALLBACKS_PER_TABLE]),
+            (
+                *((stage, *(each.get(stage, 0.0) for each in shown)) for stage in stages),
+                ("sum", *(sum(each.values()) for each in shown)),
+            ),
+        )
 
 
 def _print_host(console: Console, host: Mapping[str, Any]) -> None:
     lag = "" if host["lag_p50_us"] is None else f"event loop late by {host['lag_p50_us']:.0f} us (median), "
+    results = "1 result" if host["overruns"] == 1 else f"{host['overruns']} results"
     console.print(
         Text(
-            f"host: {lag}{host['overruns']} results later than modelled "
-            f"({_ms(host['overrun_ms'])} ms in all)",
+            f"host: {lag}{results} later than modelled ({_ms(host['overrun_ms'])} ms in all)",
             style="yellow" if host["overruns"] else "",
         )
     )
@@ -96,12 +107,15 @@ def _ms(value: float) -> str:
 
 
 def _print(console: Console, columns: Iterable[str], rows: Iterable[Iterable[object]]) -> None:
-    """Print a table, or nothing when it has no rows."""
+    """Print a table unless it has no rows; numbers stand to the right, and those with a fraction are ms."""
+    content = [list(row) for row in rows]
+    if not content:
+        return
     table = Table(box=SIMPLE_HEAD, show_edge=False, padding=(0, 1, 0, 0))
-    for column in columns:
-        table.add_column(Text(column), overflow="fold")
-    for row in rows:
-        table.add_row(*map(str, row))
-    if table.rows:
-        console.print(table, highlight=False)
-        console.print()
+    for index, column in enumerate(columns):
+        numbers = all(isinstance(row[index], int | float) for row in content)
+        table.add_column(Text(column), justify="right" if numbers else "left", overflow="fold")
+    for row in content:
+        table.add_row(*(Text(_ms(cell) if isinstance(cell, float) else str(cell)) for cell in row))
+    console.print(table, highlight=False)
+    console.print()

@@ -11,7 +11,7 @@ from rich.box import SIMPLE_HEAD
 from rich.table import Table
 from rich.text import Text
 
-from reconros_zenoh.cli.console import wide_console
+from reconros_zenoh.cli.console import interrupted, wide_console
 from reconros_zenoh.cli.options import AsJson, ClockName, Profile
 from reconros_zenoh.cli.progress import run_bar
 from reconros_zenoh.measure.statistics import format_error, format_ms, format_share
@@ -36,9 +36,10 @@ def callbacks(
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Table I: each callback alone on the board, in hardware and in software, beside the paper's times.
+    """Table I: the time of each callback alone.
 
-    In wall time the real times and those of this host's own kernels stand beside it.
+    In hardware and in software, beside the paper's. In wall time the real times and those of this host's own
+    kernels stand beside it.
     """
     from reconros_zenoh.board.profile import read_profile
     from reconros_zenoh.experiments.callbacks import PLACES, TABLE_I, measure_callbacks
@@ -52,7 +53,7 @@ def callbacks(
     else:
         _show_callbacks(result)
     if result["interrupted"]:
-        raise typer.Exit(130)
+        raise interrupted(quiet=as_json)
 
 
 def reconfiguration(
@@ -68,7 +69,10 @@ def reconfiguration(
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Table II: resources, bitstreams and reconfiguration times of the slots, beside the paper's."""
+    """Table II: reconfiguration times of the slots.
+
+    Resources, bitstream sizes and times, beside the paper's.
+    """
     from reconros_zenoh.board.profile import read_profile
     from reconros_zenoh.experiments.reconfiguration import TABLE_II, measure_reconfiguration
 
@@ -83,7 +87,7 @@ def reconfiguration(
         _print_regression(console, result)
         _print_what_if(console, result)
     if result["interrupted"]:
-        raise typer.Exit(130)
+        raise interrupted(quiet=as_json)
 
 
 def _classified(path: Path) -> dict[str, float | int]:

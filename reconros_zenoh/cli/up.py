@@ -30,7 +30,10 @@ def up(
     ] = False,
     as_json: _AsJson = False,
 ) -> None:
-    """Run the services of a Compose file as local processes until all have ended, or until Ctrl-C."""
+    """Run the services of a Compose file as local processes.
+
+    It ends when all of them have ended, or on Ctrl-C.
+    """
     environment = dict(os.environ)
     deployment = read_compose(file, environment)
     folder = StateFolder(file, environment)

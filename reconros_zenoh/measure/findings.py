@@ -45,7 +45,7 @@ def findings(experiment: Mapping[str, Any]) -> list[Finding]:
     }:
         found.append(_real_board(errors))
     found.append(_losses(cells.values()))
-    found.append(_host(experiment))
+    found.append(host_finding(experiment))
     return found
 
 
@@ -94,11 +94,14 @@ def _losses(cells: Iterable[Mapping[str, int]]) -> Finding:
     return Finding("requests", f"all {answers} were answered, and every answer was right.")
 
 
-def _host(experiment: Mapping[str, Any]) -> Finding:
+def host_finding(experiment: Mapping[str, Any]) -> Finding:
+    """Return whether the host was fast enough for the model."""
     if experiment["clock"] == "virtual":
         return Finding(
             "host", "time is virtual: the speed of the computer that ran this has no part in the figures."
         )
+    if experiment["host"]["lag_p50_us"] is None:
+        return Finding("host", "whether it kept up is not known: no board came to tell.", warning=True)
     troubles = host_troubles(experiment["host"])
     if not troubles:
         return Finding("host", "it kept up with the modelled times: no overrun.")
@@ -110,10 +113,11 @@ def host_troubles(host: Mapping[str, Any]) -> list[str]:
     """Return in what the host was too slow for the model, a sentence each."""
     troubles = []
     if overruns := host["overruns"]:
+        often = "Once" if overruns == 1 else f"{overruns} times"
         troubles.append(
-            f"{overruns} times a computation took longer on this computer than the board is modelled to need."
+            f"{often} a computation took longer on this computer than the board is modelled to need."
         )
-    late_us = host["lag_p99_us"]
+    late_us = host.get("lag_p99_us")
     if late_us is not None and late_us > LATE_US:
         troubles.append(
             f"The board's event loop was up to {late_us / 1e3:.1f} ms late (99th percentile): the shortest "

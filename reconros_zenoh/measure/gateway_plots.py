@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from itertools import cycle
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from typing import TYPE_CHECKING, Any, Literal
 
 from reconros_zenoh.measure.plots import GREY, INK, drawing_style
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 _VARIANTS = {"smt": ("SMT", "#2f7ec4"), "gateway": ("with a gateway", "#d2691e")}
 _Line = Literal["-", "--", ":", "-."]
-_LINES: tuple[_Line, ...] = get_args(_Line)
+_STYLES: tuple[tuple[_Line, str], ...] = (("-", "o"), ("--", "s"), (":", "^"), ("-.", "D"))
 _SIDES = (
     ("hardware, slowest subscriber", "hw", "hw_max_ms"),
     ("software", "sw", "sw_ms"),
@@ -25,7 +25,7 @@ _SIDES = (
 def transmission_figure(cells: Sequence[dict[str, Any]], publisher: str) -> Figure:
     """Return times (above) and speedups (below) over the message size, to hardware (left) and to software.
 
-    `cells` are those of the experiment's JSON. The line style is the number of hardware subscribers. The
+    `cells` are those of the experiment's JSON. Line and marker tell the number of hardware subscribers. The
     figures of the paper are lost: what they show is known from its text.
     """
     from matplotlib.figure import Figure  # noqa: PLC0415  takes a second, as in plots.py
@@ -50,12 +50,12 @@ def _draw(times: Axes, speedups: Axes, cells: Sequence[dict[str, Any]], side: st
     for number, count in enumerate(sorted({cell["subscribers"] for cell in cells})):
         row = sorted((cell for cell in cells if cell["subscribers"] == count), key=lambda cell: cell["size"])
         sizes = [cell["size"] for cell in row]
-        style = _LINES[number % len(_LINES)]
+        style, marker = _STYLES[number % len(_STYLES)]
         for variant, (_, colour) in _VARIANTS.items():
             values_ms = [cell[variant][time] for cell in row]
-            times.plot(sizes, values_ms, style, color=colour, marker="o", markersize=4)
+            times.plot(sizes, values_ms, style, color=colour, marker=marker, markersize=4)
         values = [cell[f"speedup_{side}"] for cell in row]
-        speedups.plot(sizes, values, style, color=INK, marker="o", markersize=4)
+        speedups.plot(sizes, values, style, color=INK, marker=marker, markersize=4)
     times.set_xscale("log")
     times.set_yscale("log")
     times.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
@@ -74,8 +74,16 @@ def _legend(figure: Figure, counts: Sequence[int]) -> None:
 
     handles = [Line2D([], [], color=colour, label=name) for name, colour in _VARIANTS.values()]
     handles += [
-        Line2D([], [], color=INK, linestyle=style, label=f"hardware subscribers: {count}")
-        for style, count in zip(cycle(_LINES), counts, strict=False)
+        Line2D(
+            [],
+            [],
+            color=INK,
+            linestyle=style,
+            marker=marker,
+            markersize=4,
+            label=f"hardware subscribers: {count}",
+        )
+        for (style, marker), count in zip(cycle(_STYLES), counts, strict=False)
     ]
     figure.legend(handles=handles, loc="outside upper right", ncols=len(handles))
 

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 PERCENTILES = {"p50_ms": 50.0, "p90_ms": 90.0, "p99_ms": 99.0, "p999_ms": 99.9, "max_ms": 100.0}
 
 _ROBUST_PERCENTILES = (0.5, 97.5)  # round-trip times have their long tail upwards
+_FEW = 40  # of fewer values 2.5 % are less than one: nothing to leave out
 _FROM = "from ms"
 _SHARE_WIDTH = 8  # " 100.0 %"
 _WIDEST_BAR = 60
@@ -50,9 +51,14 @@ class Histogram:
 def bin_edges(samples: Sequence[npt.NDArray[np.float64]], bins: int) -> npt.NDArray[np.float64]:
     """Return the edges of `bins` equal bins from the least 0.5th to the greatest 97.5th percentile.
 
+    A sample of fewer than 40 values is within them as a whole.
     Float64 of shape `(bins + 1,)` in the unit of the samples, empty if all samples are.
     """
-    ranges = [np.percentile(values, _ROBUST_PERCENTILES) for values in samples if values.size]
+    ranges = [
+        np.percentile(values, _ROBUST_PERCENTILES if values.size >= _FEW else (0, 100))
+        for values in samples
+        if values.size
+    ]
     if not ranges:
         return np.array([], dtype=np.float64)
     low, high = float(min(r[0] for r in ranges)), float(max(r[1] for r in ranges))

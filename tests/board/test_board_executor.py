@@ -61,7 +61,8 @@ def test_a_profile_without_times_for_a_callback() -> None:
         Executor(board, 1, 0).add_sw_callback("walk", SUB, Tickets(board), ignore)
     assert str(caught.value) == (
         "profile 'small' has no times for callback 'walk'. Add the callback with timing=Cycles(n) or "
-        "timing=Native(factor), or add a section [model.callbacks.walk] to a copy of the profile."
+        "timing=Native(factor), in app.register software_timing, or add a section [model.callbacks.walk] to "
+        "a copy of the profile."
     )
 
 

@@ -208,6 +208,10 @@ class Answering:
     def close(self) -> None:
         self.log.append("close")
 
+    def tokens(self, key: str, _: int) -> list[str]:
+        assert key == alive_key("*")
+        return []
+
 
 def ask(reply: Reply | None, monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
     transport = Answering(reply)
@@ -246,7 +250,7 @@ def test_the_status_of_a_board_that_answers(monkeypatch: pytest.MonkeyPatch) -> 
 @pytest.mark.parametrize("reply", [None, Reply(None, None, "no")], ids=["silence", "error"])
 def test_a_board_that_does_not_answer(reply: Reply | None, monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(
-        TransportError, match=r"no board named 'board0' answers\..*reconros board --name board0"
+        TransportError, match=r"no board named 'board0' answers\..*reconros board --name board0`\.$"
     ):
         ask(reply, monkeypatch)
 

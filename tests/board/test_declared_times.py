@@ -159,7 +159,8 @@ def test_without_any_time_it_is_refused(hardware: bool) -> None:
     how: Any = ignore
     if hardware:
         add, how = partial(executor.add_hw_callback, slots=[0]), computing
-    with pytest.raises(UsageError, match=r"timing=Cycles\(n\) or timing=Native\(factor\), or add a section"):
+    option = f"app.register {'hardware' if hardware else 'software'}_timing, or add a section"
+    with pytest.raises(UsageError, match=rf"timing=Cycles\(n\) or timing=Native\(factor\), in {option}"):
         add("walk", kind=SUB, source=Tickets(board), **{"thread" if hardware else "function": how})
 
 

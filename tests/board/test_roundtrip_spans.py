@@ -77,7 +77,7 @@ def run_alone(project: Project, registry: TypeRegistry, mapping: str, client: st
         for index in range(trips):
             # The hash client never asks: the timer of the board does, every 250 ms.
             asked_ns = environment.now if asking.asks else (index + 1) * PERIOD_NS
-            asking.ask(index)
+            asking.ask(index, PERIOD_NS)
             yield arrived[0]
             arrived_ns, answer = answers[index]
             assert asking.is_right(index, answer)

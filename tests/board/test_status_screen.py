@@ -46,7 +46,7 @@ def test_everything_that_the_board_told_is_shown() -> None:
     assert "sobel SUB software, slot 2, slot 3 table, cycles 7 1 2" in lines
     assert "slot holds reconfigurations reconfiguring [ms] busy [ms]" in lines
     assert "2 - 0 0 12.2" in lines
-    assert "sobel 1.5 0.25" in lines
+    assert lines[lines.index("mean [ms] sobel") + 2 :][:3] == ["dds 1.5", "memif 0.25", "sum 1.75"]
     assert "messages dropped before they were sent: /full 4" in lines
     assert "messages refused: truncated 3" in lines
     assert lines[-1] == (
@@ -58,3 +58,16 @@ def test_what_there_is_nothing_of_is_left_out() -> None:
     text = "\n".join(printed(STATUS | {"rejected": {}, "publishers": {}, "spans_ms": {}}))
     for heading in ("gateway", "stream", "refused", "dropped before", "mean"):
         assert heading not in text
+
+
+def test_the_stages_of_many_callbacks_stand_in_their_order_and_fit_80_columns() -> None:
+    stages = {"overrun": 0.5, "reconfiguration": 24.5, "transport": 1234.5}
+    spans_ms = {f"callback_{number}": stages for number in range(9)}
+    stream = io.StringIO()
+    print_status(Console(file=stream, width=80), STATUS | {"spans_ms": spans_ms})
+    lines = stream.getvalue().splitlines()
+    assert max(map(len, lines)) <= 80
+    heads = [line.split()[2:] for line in lines if line.startswith("mean [ms]")]
+    assert [name for head in heads for name in head] == list(spans_ms)
+    rows = [line.split()[0] for line in lines if line.endswith((" 1234 ", " 24.5 ", " 0.5 ", " 1260 "))]
+    assert rows == ["transport", "reconfiguration", "overrun", "sum"] * 2

@@ -212,6 +212,13 @@ def test_unreadable_file(tmp_path: Path, content: bytes | None) -> None:
         read_compose(path, {})
 
 
+def test_volumes_are_refused_with_a_place_to_keep_them(read: Callable[..., Deployment]) -> None:
+    with pytest.raises(FileError) as caught:
+        read("services:\n  a:\n    command: x\n    volumes: [./results:/results]")
+    assert caught.value.line == 4
+    assert "docker compose -f FILE -f SECOND" in caught.value.remedy
+
+
 def test_a_circle_names_who_waits_for_whom(read: Callable[..., Deployment]) -> None:
     text = "services:\n" + "".join(
         f"  {name}:\n    command: x\n    depends_on: [{other}]\n" for name, other in ("ab", "bc", "ca")

@@ -175,3 +175,4 @@ def test_callbacks_that_were_complete_before_an_interruption_are_kept(
     else:
         assert "sobel" in result.stdout
         assert "sort" not in result.stdout
+        assert result.stdout.endswith("interrupted before its end\n")

@@ -27,6 +27,7 @@ from reconros_zenoh.experiments.gateway import (
     measure_gateway,
     setup_mapping,
 )
+from reconros_zenoh.measure.gateway_plots import transmission_figure
 from reconros_zenoh.project.loader import load_project
 from reconros_zenoh.transport.simulated import SimulatedNetwork
 
@@ -173,11 +174,24 @@ def test_a_folder_that_cannot_be_written_is_refused_before_anything_is_measured(
 
 
 def test_the_command_prints_a_table(tmp_path) -> None:
-    result = run("--sizes", "10kB", "--publisher", "software", "--out", str(tmp_path))
+    result = run("--sizes", "10kB,10MB", "--publisher", "software", "--out", str(tmp_path))
     assert "from software" in result.stdout
+    lines = [line.split() for line in result.stdout.splitlines()]
+    assert ["to", "HW", "to", "SW"] in lines
+    assert ["kB", "subscribers", "SMT", "gateway", "speedup", "SMT", "gateway", "speedup"] in lines
     assert "from hardware" not in result.stdout
     assert "software to software, smallest: speedup 1.06, paper 1.06" in result.stdout
     assert "…" not in result.stdout
+
+
+def test_points_of_one_size_tell_the_number_of_subscribers() -> None:
+    figure = transmission_figure(
+        [cell for cell in all_cells()["cells"] if cell["size"] == 10_000], "hardware"
+    )
+    markers = {line.get_marker() for line in figure.axes[0].get_lines()}
+    shown = {handle.get_marker() for handle in figure.legends[0].legend_handles}
+    assert len(markers) == 3
+    assert markers <= shown
 
 
 @pytest.mark.parametrize(

@@ -104,6 +104,8 @@ def test_what_was_measured_before_an_interruption_is_kept(
     monkeypatch.setattr(Simulation, "run", interrupted)
     answer = json.loads(run("-f", ROUNDTRIP, "--requests", 1000, "--out", tmp_path, "--json", status=130))
     assert (answer["interrupted"], answer["simulated_s"]) == (True, 2)
+    shown = run("-f", ROUNDTRIP, "--requests", 1000, "--out", tmp_path, status=130)
+    assert shown.endswith("interrupted before its end\n")
     cells = answer["boards"]["board0"]
     assert 0 < cells["inverse"]["n"] < 1000
     for name, content in records(tmp_path).items():

@@ -1,8 +1,13 @@
 from __future__ import annotations
 
-import numpy as np
-from board_like_runs import experiment_of, like_the_board
+import io
 
+import numpy as np
+import pytest
+from board_like_runs import experiment_of, like_the_board
+from rich.console import Console
+
+from reconros_zenoh.cli.experiment import show
 from reconros_zenoh.measure.findings import findings
 from reconros_zenoh.measure.record import Record
 
@@ -85,3 +90,22 @@ def test_the_host_is_blamed_where_it_was_too_slow():
     assert late.sentence.startswith("The board's event loop was up to 2.3 ms late")
     assert late.warning
     assert not by_subject(records, "virtual", host=host(4))["host"].warning
+
+
+@pytest.mark.parametrize(
+    ("clock", "overruns", "says"),
+    [
+        ("wall", 1, "host: Once a computation took longer on this computer"),
+        ("wall", 3, "host: 3 times a computation took longer on this computer"),
+        ("wall", 0, "host: it kept up with the modelled times: no overrun."),
+        ("wall", None, "host: whether it kept up is not known"),
+        ("virtual", 0, ""),
+    ],
+)
+def test_the_terminal_says_of_wall_time_whether_the_host_kept_up(clock, overruns, says):
+    stream = io.StringIO()
+    kept = host(overruns) if overruns is not None else {"overruns": 0, "lag_p50_us": None, "lag_p99_us": None}
+    show(Console(file=stream, width=80), experiment_of({"a": {"x": constant(2.5)}}, clock, host=kept))
+    said = stream.getvalue().partition("host: ")
+    assert " ".join((said[1] + said[2]).split()).startswith(says)
+    assert bool(said[1]) == bool(says)

@@ -103,6 +103,12 @@ def test_the_mean_outside_and_the_values_outside_are_told():
     assert "the mean, 11.48 ms, lies outside the bins" in text
 
 
+@pytest.mark.parametrize("values", [[1.0, 2.0], [1.0, 2.0, 300.0], [*range(38), 1000.0]])
+def test_of_few_values_none_is_outside(values):
+    histogram = count(np.array(values), bin_edges([np.array(values)], 20))
+    assert (histogram.counts.sum(), histogram.below, histogram.above) == (len(values), 0, 0)
+
+
 def test_a_client_without_answers_says_so():
     text = "\n".join(shown(entry([], lost=7), None, 4))
     assert "no answer" in text

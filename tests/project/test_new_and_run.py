@@ -85,6 +85,13 @@ def test_the_text_ends_with_the_status(blink: Path) -> None:
     assert row[-3:] == ["2", "0", "0"]  # calls, failed, dropped
 
 
+def test_times_of_nothing_are_explained(blink: Path) -> None:
+    said = "native models nothing, so nothing took any time."
+    assert said in invoke("run", blink, "--clock", "virtual", "--seconds", 0.25)
+    modelled = invoke("run", application_folder(), "--clock", "virtual", "--seconds", 0.25)
+    assert "models nothing" not in modelled
+
+
 def test_its_target_board_decides_on_the_profile() -> None:
     assert run(application_folder(), "--seconds", 1)["profile"] == "miniitx-zynq7100"
     assert run(application_folder(), "--seconds", 1, "--profile", "native")["profile"] == "native"

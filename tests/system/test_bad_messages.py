@@ -252,7 +252,7 @@ def test_after_all_that_the_board_answers_good_requests(
     asked.open(node, types, answers.put, matched.note)
     assert matched.wait(LIMIT_S)
     for index in range(2):
-        asked.ask(index)
+        asked.ask(index, round(LIMIT_S * 1e9))
         assert asked.is_right(index, answers.get(timeout=LIMIT_S))
     node.close()
     refusals.wait_for()

@@ -39,5 +39,6 @@ def test_a_board_that_is_not_there_is_named(network: Network) -> None:
     done = run("status", "board7", "--router", network.endpoint)
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr == (
-        "reconros: no board named 'board7' answers. Start it with `reconros board --name board7`.\n"
+        "reconros: no board named 'board7' answers. Start it with `reconros board --name board7`, "
+        "or name one that runs: board0.\n"
     )

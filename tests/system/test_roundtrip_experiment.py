@@ -198,6 +198,7 @@ def test_an_interrupted_experiment_stops_its_processes_and_keeps_its_records(
         record = (tmp_path / "wall" / "all_hardware" / f"{client}.csv").read_text(encoding="ascii")
         assert (cell["n"] + cell["lost"], cell["wrong"]) == (record.count("\n") - 1, 0)
     assert sum(cell["n"] for cell in cells.values()) > 0
+    assert experiment.out[-1] == "interrupted before its end"
     assert "Traceback" not in repr(experiment)
 
 
@@ -225,4 +226,5 @@ def test_an_interrupted_experiment_in_virtual_time_keeps_its_records(tmp_path: P
         assert experiment.end(number) == 130  # some press Ctrl-C more than once
         cells = _interrupted(tmp_path, "virtual")
         assert sum(cell["n"] for cell in cells.values()) > 0
+        assert experiment.out[-1] == "interrupted before its end"
         assert "Traceback" not in repr(experiment)
