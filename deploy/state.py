@@ -20,8 +20,9 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Record:
-    """The process that runs a deployment, the states in which it left the services, and what went wrong."""
+    """What runs, the process that runs it, the states in which it left the services, and what went wrong."""
 
+    file: str
     pid: int
     states: Mapping[str, str]
     error: str
@@ -38,9 +39,8 @@ class StateFolder:
     def __init__(self, compose_file: Path, environment: Mapping[str, str]) -> None:
         self._compose_file = compose_file
         file = compose_file.resolve()
-        home = Path(environment.get("XDG_STATE_HOME") or Path.home() / ".local" / "state")
         key = hashlib.sha256(os.fsencode(file)).hexdigest()[:12]
-        self.path = home / "reconros" / f"{file.stem}-{key}"
+        self.path = _home(environment) / f"{file.stem}-{key}"
         self.logs = self.path / "logs"
         self._lock = self.path / "lock"
         self._record = self.path / "record.json"
@@ -67,12 +67,12 @@ class StateFolder:
                     f"Stop it first: reconros down -f {self._compose_file}"
                 ) from None
             # Stands until `leave` replaces it, so it tells what is true if that never happens.
-            self._write(Record(os.getpid(), {}, "The process that ran it was killed."))
+            self._write({}, "The process that ran it was killed.")
             yield
 
     def leave(self, states: Mapping[str, str], error: str) -> None:
         """Record how the owner, this process, leaves the deployment."""
-        self._write(Record(os.getpid(), states, error))
+        self._write(states, error)
 
     def end_owner(self) -> Record | None:
         """Stop the deployment if it is running; return its last record and forget it.
@@ -86,16 +86,41 @@ class StateFolder:
                 fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except BlockingIOError:
                 with suppress(ProcessLookupError):  # it has just ended by itself
-                    os.kill(self._read().pid, signal.SIGTERM)
+                    os.kill(_read(self._record).pid, signal.SIGTERM)
                 fcntl.flock(lock, fcntl.LOCK_EX)  # the owner lets go when everything has stopped
-            record = self._read()
+            record = _read(self._record)
             self._record.unlink()
             return record
 
-    def _write(self, record: Record) -> None:
+    def _write(self, states: Mapping[str, str], error: str) -> None:
+        record = Record(str(self._compose_file.resolve()), os.getpid(), states, error)
         new = self._record.with_suffix(".new")
         new.write_text(json.dumps(asdict(record)), encoding="utf-8")
         new.replace(self._record)  # at once, so that nobody reads half a record
 
-    def _read(self) -> Record:
-        return Record(**json.loads(self._record.read_text(encoding="utf-8")))
+
+def running(environment: Mapping[str, str]) -> list[Path]:
+    """Return the Compose files whose deployments this user has running."""
+    return sorted(
+        Path(_read(record).file)
+        for record in _home(environment).glob("*/record.json")
+        if _is_locked(record.with_name("lock"))
+    )
+
+
+def _home(environment: Mapping[str, str]) -> Path:
+    home = environment.get("XDG_STATE_HOME") or Path.home() / ".local" / "state"
+    return Path(home) / "reconros"
+
+
+def _is_locked(path: Path) -> bool:
+    with path.open("ab") as lock:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            return True
+    return False
+
+
+def _read(record: Path) -> Record:
+    return Record(**json.loads(record.read_text(encoding="utf-8")))

@@ -11,10 +11,10 @@ import typer
 from rich.console import Console
 
 from deploy.compose import read_compose
-from deploy.state import StateFolder
+from deploy.state import StateFolder, running
 from deploy.supervisor import start_supervisor, supervise
 from reconros_zenoh.cli.service_screen import ServiceScreen
-from reconros_zenoh.errors import ExperimentError
+from reconros_zenoh.errors import ExperimentError, UsageError
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -59,17 +59,24 @@ def up(
         console.print(f"{file} is up, its logs are in {folder.logs}. Stop it with: reconros down -f {file}")
 
 
-def down(file: _File, as_json: _AsJson = False) -> None:
-    """Stop what `reconros up` of this Compose file has started."""
-    folder = StateFolder(file, os.environ)
-    record = folder.end_owner()
+def down(
+    file: Annotated[
+        Path | None,
+        typer.Option("--file", "-f", help="The Compose file.", show_default="the one that is running"),
+    ] = None,
+    as_json: _AsJson = False,
+) -> None:
+    """Stop what `reconros up` has started."""
+    file = file or _the_one_running()
+    folder = StateFolder(file, os.environ) if file else None
+    record = folder.end_owner() if folder else None
     if as_json:
-        states, error = ({}, "") if record is None else (record.states, record.error)
+        states, error = (record.states, record.error) if record else ({}, "")
         _print_json(file, folder, states, error)
         return
     console = _console(quiet=False)
     if record is None:
-        console.print(f"Nothing of {file} is running.")
+        console.print(f"Nothing of {file} is running." if file else "Nothing is running.")
         return
     for service, state in record.states.items():
         console.print(f"{service}: {state}")
@@ -81,5 +88,15 @@ def _console(*, quiet: bool) -> Console:
     return Console(highlight=False, markup=False, emoji=False, soft_wrap=True, quiet=quiet)
 
 
-def _print_json(file: Path, folder: StateFolder, states: Mapping[str, str], error: str) -> None:
-    print(json.dumps({"file": str(file), "logs": str(folder.logs), "services": states, "error": error}))
+def _the_one_running() -> Path | None:
+    files = running(os.environ)
+    if len(files) > 1:
+        which = " or ".join(f"-f {file}" for file in files)
+        raise UsageError(f"{len(files)} Compose files are up. Say which one is to stop: {which}")
+    return files[0] if files else None
+
+
+def _print_json(file: Path | None, folder: StateFolder | None, states: Mapping[str, str], error: str) -> None:
+    """Print the outcome; without a file nothing was running."""
+    logs = None if folder is None else str(folder.logs)
+    print(json.dumps({"file": file and str(file), "logs": logs, "services": states, "error": error}))

@@ -8,7 +8,7 @@ import os
 import signal
 import subprocess
 import sys
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import psutil
 import pytest
@@ -27,7 +27,8 @@ if TYPE_CHECKING:
 
     from conftest import Services
 
-    Start = Callable[..., subprocess.Popen[str]]
+    Popen = subprocess.Popen[str]
+    Start = Callable[..., Popen]
     Run = Callable[..., subprocess.CompletedProcess[str]]
 
 PROGRAM = """
@@ -47,11 +48,11 @@ except ReconrosError as error:
 
 @pytest.fixture
 def start(tmp_path: Path) -> Start:
-    """Return a function that starts `up` or `down` for the Compose file of the test."""
+    """Return a function that starts `up` or `down`: for the Compose file of the test, or for `file`."""
 
-    def start_command(verb: str, *options: str) -> subprocess.Popen[str]:
+    def start_command(verb: str, *options: str, file: Path | None = tmp_path / "compose.yaml") -> Popen:
         return subprocess.Popen(
-            [sys.executable, "-c", PROGRAM, verb, "-f", str(tmp_path / "compose.yaml"), *options],
+            [sys.executable, "-c", PROGRAM, verb, *([] if file is None else ["-f", str(file)]), *options],
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
@@ -71,8 +72,8 @@ def start(tmp_path: Path) -> Start:
 def run(start: Start) -> Iterator[Run]:
     """Return a function that runs `up` or `down` to its end; after the test it is stopped."""
 
-    def run_command(verb: str, *options: str) -> subprocess.CompletedProcess[str]:
-        with start(verb, *options) as process:
+    def run_command(verb: str, *options: str, **given: Any) -> subprocess.CompletedProcess[str]:
+        with start(verb, *options, **given) as process:
             output, errors = process.communicate()
             return subprocess.CompletedProcess(process.args, process.returncode, output, errors)
 
@@ -166,6 +167,33 @@ def test_down_stops_what_up_has_left_running(services: Services, run: Run) -> No
         0,
         f"Nothing of {services.folder / 'compose.yaml'} is running.\n",
     )
+
+
+def test_down_without_a_file_stops_the_one_that_is_running(
+    services: Services, run: Run, tmp_path: Path
+) -> None:
+    _server_and(services, "block()")
+    other = tmp_path / "other.yaml"
+    other.write_text((services.folder / "compose.yaml").read_text())
+    assert run("up", "-d").returncode == 0
+    assert run("up", "-d", file=other).returncode == 0
+    try:
+        unclear = run("down", file=None)
+        assert unclear.returncode == 2
+        assert f"-f {services.folder / 'compose.yaml'} or -f {other}" in unclear.stderr
+    finally:
+        assert run("down", file=other).returncode == 0
+
+    down = run("down", file=None)
+    assert (down.returncode, down.stdout) == (0, "server: stopped\nclient: stopped\n")
+    services.assert_gone()
+    assert run("down", file=None).stdout == "Nothing is running.\n"
+    assert json.loads(run("down", "--json", file=None).stdout) == {
+        "file": None,
+        "logs": None,
+        "services": {},
+        "error": "",
+    }
 
 
 def test_down_stops_a_foreground_up_too(services: Services, start: Start, run: Run) -> None:
