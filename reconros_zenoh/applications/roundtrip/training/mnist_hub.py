@@ -40,14 +40,14 @@ class NumpyUnpickler(pickle.Unpickler):
 def read_digits() -> tuple[Digits, Digits]:
     """Return the 60,000 training digits (validation digits among them) and the 10,000 test digits.
 
-    The package holds float32 rows of 784 values from 0 to 1; a pixel here is the value times 255, rounded.
+    The package holds float32 rows of 784 values from 0 to 1: the bytes of MNIST, divided by 256.
     """
     file = resources.files("mnist") / "data" / "mnist.pkl.gz"
     stream = gzip.GzipFile(fileobj=file.open("rb"))
     with stream:
         sets = NumpyUnpickler(stream, encoding="latin1").load()
     train, validation, test = (
-        Digits(np.rint(rows * 255).astype(np.uint8).reshape(-1, 28, 28), labels.astype(np.uint8))
+        Digits(np.rint(rows * 256).astype(np.uint8).reshape(-1, 28, 28), labels.astype(np.uint8))
         for rows, labels in sets
     )
     both = Digits(
