@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from reconros_zenoh.transport.base import Declaration, Reply, Request, Transport
 
 VERSION = 1
+_HOST_ANEW = b"host anew"
 _ANSWER_NS = 2_000_000_000
 
 
@@ -67,10 +68,14 @@ class ControlServer:
 
     def _on_status(self, request: Request) -> None:
         # The board's state belongs to the thread of its event loop.
-        self._board.environment.post(self._reply_status, request)
+        self._board.environment.post(self._reply_status, request, request.read() == _HOST_ANEW)
 
-    def _reply_status(self, request: Request) -> None:
+    def _reply_status(self, request: Request, host_anew: bool) -> None:
         request.reply((msgpack.packb(status(self._board, self._executor)),), None)
+        if host_anew:
+            self._board.host.forget_overruns()
+            if isinstance(self._board.environment, WallEnvironment):
+                self._board.environment.forget_lag()
 
 
 def status(board: Board, executor: Executor) -> dict[str, Any]:
@@ -145,9 +150,12 @@ def gateways(board: Board) -> list[dict[str, Any]]:
     ]
 
 
-def ask_status(transport: Transport, board: str) -> dict[str, Any]:
-    """Return the status of the board of that name; raise TransportError when it does not answer."""
-    return ask(transport, board, "status", b"")
+def ask_status(transport: Transport, board: str, *, host_anew: bool = False) -> dict[str, Any]:
+    """Return the status of the board of that name; raise TransportError when it does not answer.
+
+    With `host_anew` what it says of its host counts from then on, for all who ask.
+    """
+    return ask(transport, board, "status", _HOST_ANEW if host_anew else b"")
 
 
 def ask(transport: Transport, board: str, what: str, question: bytes) -> dict[str, Any]:

@@ -168,6 +168,10 @@ class Host:
             return _frozen(kernel(*arguments), arguments)
         return _results.of(kernel, *arguments)
 
+    def forget_overruns(self) -> None:
+        """Count overruns from here on."""
+        self.overruns = Overruns()
+
     def close(self) -> None:
         """Start no other computation, and wait for a while for those that run."""
         if self._pool is not None:

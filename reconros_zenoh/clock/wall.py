@@ -118,6 +118,10 @@ class WallEnvironment(VirtualEnvironment):
         p50, p99 = np.percentile(lags, (50, 99)) / 1e3
         return Lag(len(lags), float(p50), float(p99), float(lags.max()) / 1e3)
 
+    def forget_lag(self) -> None:
+        """Let `lag` speak of later events only."""
+        self._lags_ns.clear()
+
     def _catch_up(self, deadline_ns: int) -> float:
         """Do what is due, in the order of time, and return when the next event is; called with the turn.
 

@@ -6,12 +6,14 @@ import os
 import socket
 import threading
 import uuid
+from contextlib import suppress
 from importlib.resources import as_file, files
 from typing import TYPE_CHECKING, Self
 
 from deploy.compose import read_compose
 from deploy.runner import LocalRunner
 from reconros_zenoh.board.control import ask_status
+from reconros_zenoh.errors import TransportError
 from reconros_zenoh.experiments.roundtrip import ANSWER_LIMIT_S, CLIENTS, BoardReport
 from reconros_zenoh.transport.zenoh import ZenohTransport
 
@@ -48,7 +50,7 @@ def run_wall(plan: Plan, report: BoardReport, on_progress: Callable[[str, str], 
             deployment = read_compose(compose, environment)
             with (
                 LocalRunner(deployment, plan.folder / mapping / "logs", environment) as runner,
-                _Watch(plan, mapping, on_progress),
+                _Watch(plan, mapping, router, on_progress),
             ):
                 runner.run_until(set(CLIENTS))
                 with ZenohTransport.open(router) as transport:
@@ -56,12 +58,19 @@ def run_wall(plan: Plan, report: BoardReport, on_progress: Callable[[str, str], 
 
 
 class _Watch:
-    """Reports the lines that the clients of a mapping append to their records, from a thread of its own."""
+    """Reports the lines that the clients of a mapping append to their records, from a thread of its own.
 
-    def __init__(self, plan: Plan, mapping: str, on_progress: Callable[[str, str], None]) -> None:
+    With the first of them what the board says of its host begins anew: while all processes start, the host is
+    busier than it will ever be.
+    """
+
+    def __init__(
+        self, plan: Plan, mapping: str, router: str, on_progress: Callable[[str, str], None]
+    ) -> None:
         self._paths = {client: plan.record_path(mapping, client) for client in CLIENTS}
         self._seen = dict.fromkeys(CLIENTS, 0)
         self._mapping = mapping
+        self._router = router
         self._on_progress = on_progress
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._run, daemon=True)
@@ -76,6 +85,12 @@ class _Watch:
         self._look()
 
     def _run(self) -> None:
+        while not any(self._seen.values()):
+            if self._ended.wait(_LOOK_EVERY_S):
+                return
+            self._look()
+        with suppress(TransportError), ZenohTransport.open(self._router) as transport:
+            ask_status(transport, BOARD, host_anew=True)
         while not self._ended.wait(_LOOK_EVERY_S):
             self._look()
 

@@ -123,6 +123,22 @@ def test_the_status_says_how_often_and_how_long_the_host_was_too_slow() -> None:
     assert status(board, executor)["host"]["overrun_ms"] == 3.5
 
 
+@pytest.mark.parametrize(("question", "left"), [(b"host anew", 0), (b"", 2)])
+def test_what_the_status_says_of_the_host_can_begin_anew(question: bytes, left: int) -> None:
+    board, executor = board_that_ran()
+    server = ControlServer(board, executor)
+    board.host.overruns.count = 2
+    replies: list[Reply | None] = []
+    querier = desktop(board).transport.request("reconros/board0/status")
+    querier.get((question,), None, replies.append, 10**9)
+    board.environment.run(until=board.environment.now + 1000)
+    assert replies[0] is not None
+    assert replies[0].payload is not None
+    assert msgpack.unpackb(replies[0].payload)["host"]["overruns"] == 2
+    assert status(board, executor)["host"]["overruns"] == left
+    server.close()
+
+
 def test_over_the_wire_the_status_is_msgpack() -> None:
     board, executor = board_that_ran()
     server = ControlServer(board, executor)

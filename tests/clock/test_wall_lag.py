@@ -97,6 +97,16 @@ def test_lag_forgets_all_but_the_last_events(made_up: MadeUpTime, monkeypatch: p
     assert astuple(environment.lag()) == pytest.approx((2, 1, 1.98, 2))
 
 
+def test_lag_can_begin_anew(made_up: MadeUpTime) -> None:
+    environment = WallEnvironment()
+    made_up.now_ns = 10 * US
+    run_late(environment, 1 * US)
+    environment.forget_lag()
+    assert environment.lag().events == 0
+    run_late(environment, 2 * US)
+    assert environment.lag().events == 1
+
+
 @pytest.mark.parametrize(("off_ns", "spins"), [(0, 4), (99 * US, 1), (150 * US, 0)])
 def test_a_new_loop_sleeps_until_a_tenth_of_a_millisecond_before_an_event_and_spins_the_rest(
     made_up: MadeUpTime, off_ns: int, spins: int
