@@ -10,6 +10,8 @@ import numpy as np
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from numpy.typing import NDArray
+
     from reconros_zenoh.transport.base import Parts
 
 _MIB = 1024 * 1024
@@ -92,9 +94,8 @@ def _ending_with(part: memoryview) -> bytes | None:
         owner = owner.obj if isinstance(owner, memoryview) else owner.base
     if not (isinstance(owner, bytes) and part):
         return None
-    return owner if _end(part) == _end(owner) else None
+    return owner if np.may_share_memory(_last_byte(part), _last_byte(owner)) else None
 
 
-def _end(buffer: bytes | memoryview) -> int:
-    array = np.frombuffer(buffer, np.uint8)
-    return int(array.__array_interface__["data"][0]) + len(array)
+def _last_byte(buffer: bytes | memoryview) -> NDArray[np.uint8]:
+    return np.frombuffer(buffer, np.uint8, 1, len(buffer) - 1)

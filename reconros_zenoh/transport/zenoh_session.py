@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 # A socket is watched by the pool that accepted it: were `acc` elsewhere, a message would wake a thread more.
 _THREADS = "(rx: (handover: net), tx: (handover: net), acc: (handover: net), net: (worker_threads: 4))"
 
+_COLLECT = GarbageCollect()
+
 _T = TypeVar("_T")
 _thread = threading.local()
 
@@ -71,9 +73,12 @@ def open_pool(pool_bytes: int) -> Callable[[int], ZShmMut | None] | None:
 
     def allocate(size: int) -> ZShmMut | None:
         # It does not wait (BlockOn): a reader that keeps its samples would stop the publisher.
-        for _ in range(2):  # what the first try collects may suffice for the second only
+        try:
+            return pool.alloc(size, _COLLECT)
+        except zenoh.ZError:
+            # What the first try has collected may suffice for the second only.
             with suppress(zenoh.ZError):
-                return pool.alloc(size, GarbageCollect())
-        return None
+                return pool.alloc(size, _COLLECT)
+            return None
 
     return allocate
