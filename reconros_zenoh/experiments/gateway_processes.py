@@ -164,9 +164,8 @@ def run_publisher(connection: Connection, router: str, size: int) -> None:
     with ZenohTransport.open(router) as transport:
         publisher = Context(transport).node("publisher").publisher(image_type, _TOPIC)
         for number in commands(connection):
-            seconds, nanoseconds = divmod(time.monotonic_ns(), _S)
             image = image_type.cls(
-                header=header(stamp=stamp(sec=seconds, nanosec=nanoseconds), frame_id=f"{number} {crc:08x}"),
+                header=header(stamp=stamp(sec=0, nanosec=0), frame_id=f"{number} {crc:08x}"),
                 height=1,
                 width=size,
                 encoding="mono8",
@@ -174,6 +173,7 @@ def run_publisher(connection: Connection, router: str, size: int) -> None:
                 step=size,
                 data=body,
             )
+            image.header.stamp.sec, image.header.stamp.nanosec = divmod(time.monotonic_ns(), _S)
             publisher.publish(image)
 
 
