@@ -87,7 +87,7 @@ def test_the_host_is_blamed_where_it_was_too_slow():
         == "it kept up with the modelled times: no overrun."
     )
     late = by_subject(records, "wall", host=host(0) | {"lag_p99_us": 2345.0})["host"]
-    assert late.sentence.startswith("The board's event loop was up to 2.3 ms late")
+    assert late.sentence.startswith("One event in a hundred of the board came more than 2.3 ms late")
     assert late.warning
     assert not by_subject(records, "virtual", host=host(4))["host"].warning
 
