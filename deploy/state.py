@@ -101,11 +101,12 @@ class StateFolder:
 
 def running(environment: Mapping[str, str]) -> list[Path]:
     """Return the Compose files whose deployments this user has running."""
-    return sorted(
-        Path(_read(record).file)
-        for record in _home(environment).glob("*/record.json")
-        if _is_locked(record.with_name("lock"))
-    )
+    files = []
+    for record in _home(environment).glob("*/record.json"):
+        if _is_locked(record.with_name("lock")):
+            with suppress(FileNotFoundError):  # it has just ended, and another `down` has told of it
+                files.append(Path(_read(record).file))
+    return sorted(files)
 
 
 def _home(environment: Mapping[str, str]) -> Path:
@@ -116,11 +117,17 @@ def _home(environment: Mapping[str, str]) -> Path:
 def _is_locked(path: Path) -> bool:
     with path.open("ab") as lock:
         try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            # Shared: two that look at the same time must not take each other for an owner.
+            fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
         except BlockingIOError:
             return True
     return False
 
 
 def _read(record: Path) -> Record:
-    return Record(**json.loads(record.read_text(encoding="utf-8")))
+    try:
+        return Record(**json.loads(record.read_text(encoding="utf-8")))
+    except TypeError:
+        raise FileError(
+            record, None, "was written by another version of reconros.", "Use that one, or remove the file."
+        ) from None
