@@ -174,6 +174,11 @@ def ask(transport: Transport, board: str, what: str, question: bytes) -> dict[st
         reply = replies.get()
     if reply is None or reply.payload is None:
         running = [token.split("/")[1] for token in transport.tokens(alive_key("*"), _ANSWER_NS)]
+        if board in running:
+            raise TransportError(
+                f"board {board!r} is running but does not answer: it may be too busy. Ask again, or look at "
+                "its log."
+            )
         others = f", or name one that runs: {', '.join(running)}" if running else ""
         raise TransportError(
             f"no board named {board!r} answers. Start it with `reconros board --name {board}`{others}."

@@ -20,7 +20,7 @@ from reconros_zenoh.transport.base import Reply
 from reconros_zenoh.transport.simulated import SimulatedNetwork, SimulatedTransport
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterable
 
     from reconros_zenoh.board.board import Board
 
@@ -204,8 +204,9 @@ def test_the_token_of_a_board() -> None:
 class Answering:
     """A transport whose peer answers at once, when it has been found."""
 
-    def __init__(self, reply: Reply | None) -> None:
+    def __init__(self, reply: Reply | None, running: Iterable[str]) -> None:
         self._reply = reply
+        self._running = running
         self.log: list[str] = []
 
     def request(self, key: str, on_matching: Callable[[bool], None]) -> Answering:
@@ -226,11 +227,11 @@ class Answering:
 
     def tokens(self, key: str, _: int) -> list[str]:
         assert key == alive_key("*")
-        return []
+        return [alive_key(board) for board in self._running]
 
 
-def ask(reply: Reply | None, monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
-    transport = Answering(reply)
+def ask(reply: Reply | None, monkeypatch: pytest.MonkeyPatch, running: Iterable[str] = ()) -> dict[str, Any]:
+    transport = Answering(reply, running)
 
     class NotingEvent:
         def set(self) -> None:
@@ -269,6 +270,20 @@ def test_a_board_that_does_not_answer(reply: Reply | None, monkeypatch: pytest.M
         TransportError, match=r"no board named 'board0' answers\..*reconros board --name board0`\.$"
     ):
         ask(reply, monkeypatch)
+
+
+@pytest.mark.parametrize(
+    ("running", "says"),
+    [
+        (["a", "b"], "no board named 'board0' answers. .*, or name one that runs: a, b.$"),
+        (["a", "board0"], "board 'board0' is running but does not answer"),
+    ],
+)
+def test_a_board_that_does_not_answer_is_not_taken_for_one_that_is_not_there(
+    running: list[str], says: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with pytest.raises(TransportError, match=f"^{says}"):
+        ask(None, monkeypatch, running)
 
 
 def test_a_board_of_another_version(monkeypatch: pytest.MonkeyPatch) -> None:
