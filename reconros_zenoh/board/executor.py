@@ -120,7 +120,7 @@ class Executor:
         """
         if isinstance(source, HmtSource):
             raise UsageError(f"callback {name!r} reads a hardware-mapped topic: it cannot run in software.")
-        _check_function(name, function)
+        self._check_addition(name, function)
         if not self._software_workers:
             raise UsageError(f"callback {name!r} runs in software, but there are no software workers.")
         time = software_time(self.board.profile, name, timing)
@@ -144,7 +144,7 @@ class Executor:
         One that is not reconfigurable holds it from the start, and no other callback can be added to it; none
         can be added to one with a gateway.
         """
-        _check_function(name, thread)
+        self._check_addition(name, thread)
         served = {slot.slot_id for slot in self._slots}
         for slot in slots:
             if slot not in served:
@@ -253,13 +253,17 @@ class Executor:
         drift_ns = poll_ns * self._poll_jitter * math.sqrt(idle_ns / poll_ns)
         return round(-(idle_ns + self.board.randomness.gauss(0, drift_ns)) % poll_ns)
 
-    def _register(
-        self, name: str, kind: CallbackKind, source: Source, check: Callable[[Any], None] | None
-    ) -> _Registration:
+    def _check_addition(self, name: str, function: object) -> None:
+        if not callable(function):
+            raise UsageError(f"callback {name!r} is {function!r}, which cannot be called. Give a function.")
         if self._is_spinning:
             raise UsageError(
                 f"callback {name!r} is added to an executor that spins already. Call spin() last."
             )
+
+    def _register(
+        self, name: str, kind: CallbackKind, source: Source, check: Callable[[Any], None] | None
+    ) -> _Registration:
         registration = self._registrations.setdefault(name, _Registration(kind, source, check))
         if registration.source is not source:
             raise UsageError(f"callback {name!r} is registered already with another source.")
@@ -284,11 +288,6 @@ class Executor:
     def _wake(self, entry: CallbackEntry) -> None:
         for worker in self._workers_of[entry.name]:
             worker.wake()
-
-
-def _check_function(callback: str, function: object) -> None:
-    if not callable(function):
-        raise UsageError(f"callback {callback!r} is {function!r}, which cannot be called. Give a function.")
 
 
 def _check_message(callback: str, check: Callable[[Any], None], message: object) -> None:

@@ -72,6 +72,17 @@ def test_a_second_callback_is_refused() -> None:
         case.executor.add_hw_callback("loaded", [0], CallbackKind.SUB, source, thread)
 
 
+def test_a_callback_that_is_added_too_late_takes_no_slot() -> None:
+    board = small_board(small_profile(TIMES), 2, static=[0])
+    executor = Executor(board, 0, 2)
+    source = Tickets(board)
+    executor.add_hw_callback("loaded", [1], CallbackKind.SUB, source, logging_thread([], "loaded"))
+    executor.spin()
+    with pytest.raises(UsageError, match="spins already"):
+        executor.add_hw_callback("fixed", [0], CallbackKind.SUB, source, logging_thread([], "fixed"))
+    assert (board.slots[0].holds, board.slots[0].tenants) == (None, set())
+
+
 def test_it_needs_no_bitstream_file(tmp_path: Path) -> None:
     with pytest.raises(BitstreamError, match=r"pblock_slot_1_loaded_1_partial\.bit"):
         Board(tmp_path).executor.spin()
