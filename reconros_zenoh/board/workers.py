@@ -130,7 +130,7 @@ class SoftwareWorker(Worker):
 
 
 class HardwareWorker(Worker):
-    """Runs callbacks in one reconfigurable slot."""
+    """Runs callbacks in one slot."""
 
     def __init__(self, executor: Executor, slot: Slot, poll_ns: int) -> None:
         super().__init__(executor, slot.slot_id, poll_ns)

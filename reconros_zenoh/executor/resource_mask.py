@@ -14,7 +14,7 @@ SOFTWARE = -1
 
 @dataclass(frozen=True, slots=True)
 class ResourceMask:
-    """A field for software and one for each reconfigurable slot.
+    """A field for software and one for each slot that a hardware worker serves.
 
     A filled field holds the implementation that a worker of that resource starts: the function of the
     callback for software, the bitstream for a slot (ReconROS Executor, Section III-B).

@@ -239,7 +239,7 @@ class Application:
             if software is None:
                 raise UsageError(
                     f"callback {name!r} is mapped to software, but no `software` is given. Give it, or "
-                    "map the callback to reconfigurable slots."
+                    "map the callback to slots."
                 )
             executor.add_sw_callback(name, kind, source, software, check, software_timing, limit_ms)
         if place.slots:
