@@ -74,7 +74,12 @@ class Client(Endpoint):
             answered = True
             on_received(self._result(reply, number))
 
-        self._querier.get(parts, self.attachment(number), on_reply, timeout_ns)
+        try:
+            self._querier.get(parts, self.attachment(number), on_reply, timeout_ns)
+        except TransportError:
+            if not answered:  # Zenoh may say that the request is over, and then that it cannot be sent
+                answered = True
+                raise
 
     def close(self) -> None:
         """Withdraw the client; a call that still waits is not heard of any more. Idempotent."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -14,6 +15,8 @@ from reconros_zenoh.executor.callbacks import CallbackKind
 from reconros_zenoh.ros.attachment import Attachment
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from small_board import Steps
 
     from reconros_zenoh.board.callback import HardwareThread
@@ -165,6 +168,22 @@ def test_a_call_that_cannot_be_sent_is_told_as_none(caplog: pytest.LogCaptureFix
     case.run(1)
     assert [response for _, response in case.heard] == [None]
     assert "the session is closed" in caplog.text
+
+
+@pytest.mark.parametrize("when", ["never", "before", "after"])
+def test_a_call_that_cannot_be_sent_is_told_once(when: str) -> None:
+    case = Asking()
+
+    def fail(_: object, __: object, on_reply: Callable[[None], None], ___: int) -> None:
+        if when == "before":
+            on_reply(None)
+        if when == "after":
+            case.board.environment.call_later(1000, on_reply, None)
+        raise TransportError("the session is closed")
+
+    case.client._client._querier = SimpleNamespace(get=fail)  # type: ignore[assignment]
+    case.run(1)
+    assert [response for _, response in case.heard] == [None]
 
 
 def test_a_server_that_says_nothing_is_given_up_in_time(caplog: pytest.LogCaptureFixture) -> None:
