@@ -49,9 +49,9 @@ class WallEnvironment(VirtualEnvironment):
 
     The loop belongs to whoever has the turn. The thread in `run` takes it when the next event is due: it
     sleeps until shortly before and spins the rest, because a sleep ends late. By how much on this host it
-    learns, so that one sleep in twenty ends after its event. A thread that posts takes the turn itself when
-    it is free and does what is due, for to wake another thread takes longer than most messages do. Before
-    `run` and after it nobody has the turn: posted calls wait.
+    learns, within 20 to 500 us, so that one sleep in twenty ends after its event. A thread that posts takes
+    the turn itself when it is free and does what is due, for to wake another thread takes longer than most
+    messages do. Before `run` and after it nobody has the turn: posted calls wait.
     """
 
     def __init__(self) -> None:
