@@ -102,13 +102,13 @@ def gateway_slots(
 ) -> dict[str, int]:
     """Return the id of the slot that each gateway has for itself: one that no callback is mapped to.
 
-    Of the slots that a gateway can be built for it is the first, if possible one that no thread is built for.
-    Raise FileError at the line of a gateway that none is left for.
+    Of the slots that a gateway can be built for it is the first, if possible one that no thread is built for;
+    gateways with few of them choose first. Raise FileError at the line of a gateway that none is left for.
     """
     threads = {slot for thread in configuration.threads if thread.hardware for slot in thread.slots}
     tenants = {slot: f"the callback {name}" for name, mapped in callbacks.items() for slot in mapped.slots}
     slots: dict[str, int] = {}
-    for gateway in configuration.gateways:
+    for gateway in sorted(configuration.gateways, key=lambda gateway: len(gateway.slots)):
         free = [slot for slot in gateway.slots if slot not in tenants]
         if not free:
             others = dict.fromkeys(tenants[slot] for slot in gateway.slots)

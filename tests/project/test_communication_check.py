@@ -184,6 +184,12 @@ def test_a_gateway_takes_a_slot_that_no_thread_wants_if_it_can(tmp_path, slots, 
     assert gateway_slots(read, {"t": CallbackMapping(slots=mapped)}) == {"g": taken}
 
 
+def test_a_gateway_that_can_be_anywhere_leaves_its_slot_to_one_that_cannot(tmp_path) -> None:
+    anywhere = GATEWAY.format("g", "/a", "/b", "sensor_msgs/Image").replace("slot(1)", "slot(*)")
+    there = GATEWAY.format("h", "/c", "/d", "sensor_msgs/Image").replace("slot(1)", "slot(0)")
+    assert gateway_slots(configuration(tmp_path, anywhere + there), {}) == {"h": 0, "g": 1}
+
+
 def test_a_gateway_whose_slots_are_none_is_refused(tmp_path) -> None:
     gateway = GATEWAY.format("g", "/a", "/b", "sensor_msgs/Image").replace("slot(1)", "other(*)")
     with pytest.raises(FileError, match="gateway g has no slot for itself: its Slot names none"):
