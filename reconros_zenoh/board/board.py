@@ -159,6 +159,9 @@ class Board:
                 f"profile {self.profile.name!r} has no times for a gateway. Add a section [model.gateway] "
                 "to a copy of the profile, or use the profile zcu104 or native."
             )
+        slot = self.slots.get(slot_id)
+        if slot is None:
+            raise UsageError(f"there is no slot {slot_id}. The board has {sorted(self.slots) or 'none'}.")
         pair = Pair(hmt_key(self.name, hmt), smt)
         taken = conflict(pair, [gateway.pair for gateway in self.gateways])
         if taken is not None:
@@ -166,7 +169,6 @@ class Board:
                 f"{taken} has a gateway on board {self.name!r} already: two would send messages round."
             )
         topic = self.hardware_topic(hmt, message_type)
-        slot = self.slots[slot_id]
         bitstream = slot.admit(name, alone=True)
         if at_power_up:
             slot.holds = bitstream

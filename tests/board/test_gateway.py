@@ -205,6 +205,8 @@ def test_its_slot_holds_it_from_the_start_and_nothing_else() -> None:
     assert (slot.holds.callback, slot.reconfigurations) == ("bridge", 0)
     with pytest.raises(UsageError, match="'second' cannot be in slot 0, which is for bridge"):
         side.board.add_gateway("second", "/b", "/b", words, 0)
+    with pytest.raises(UsageError, match=r"there is no slot 9. The board has \["):
+        side.board.add_gateway("second", "/b", "/b", words, 9)
 
 
 def test_its_ends_have_its_qos() -> None:
