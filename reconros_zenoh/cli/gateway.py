@@ -61,9 +61,9 @@ def gateway(
 ) -> None:
     """List the gateways of a board, or add one.
 
-    A gateway connects a hardware-mapped and a software-mapped topic, and is loaded into a free slot. The QoS is
-    that of its ends on the software-mapped topic. Exit status 2 when no slot is free, or one of the topics has
-    a gateway already or another type.
+    A gateway connects a hardware-mapped and a software-mapped topic, and is loaded into a free slot. The QoS
+    is that of its ends on the software-mapped topic. Exit status 2 when no slot is free, or one of the topics
+    has a gateway already or another type.
     """
     from reconros_zenoh.board.gateway_control import ask_gateways, check_type
     from reconros_zenoh.project.type_names import inline_message_type
