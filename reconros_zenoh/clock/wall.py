@@ -21,7 +21,10 @@ if TYPE_CHECKING:
 
     import simpy
 
-_LEAD_NS = (20_000, 500_000)
+# How long before an event a sleep is to end, and the share of sleeps that may end after it.
+_FIRST_LEAD_NS = 100_000
+_LEAST_LEAD_NS = 20_000
+_MOST_LEAD_NS = 500_000
 _LEAD_STEP_NS = 5_000
 _LATE_SLEEPS = 0.05
 _TURN_NS = 1_000_000
@@ -61,7 +64,7 @@ class WallEnvironment(VirtualEnvironment):
         self._turn.acquire()
         self._alarm: SimpleQueue[None] = SimpleQueue()
         self._asleep_until: float = -1
-        self._lead_ns: float = 100_000
+        self._lead_ns: float = _FIRST_LEAD_NS
         self._failure: BaseException | None = None
         self._lags_ns: deque[int] = deque(maxlen=_LAGS_KEPT)
 
@@ -168,7 +171,7 @@ class WallEnvironment(VirtualEnvironment):
     def _learn_lead(self, is_late: bool) -> None:
         """Adjust how long before an event a sleep is to end."""
         step_ns = _LEAD_STEP_NS * (is_late - _LATE_SLEEPS)
-        self._lead_ns = min(max(self._lead_ns + step_ns, _LEAD_NS[0]), _LEAD_NS[1])
+        self._lead_ns = min(max(self._lead_ns + step_ns, _LEAST_LEAD_NS), _MOST_LEAD_NS)
 
 
 def keep_time() -> None:

@@ -73,12 +73,9 @@ def open_pool(pool_bytes: int) -> Callable[[int], ZShmMut | None] | None:
 
     def allocate(size: int) -> ZShmMut | None:
         # It does not wait (BlockOn): a reader that keeps its samples would stop the publisher.
-        try:
-            return pool.alloc(size, _COLLECT)
-        except zenoh.ZError:
-            # What the first try has collected may suffice for the second only.
+        for _ in range(2):  # what the first try collects may suffice for the second only
             with suppress(zenoh.ZError):
                 return pool.alloc(size, _COLLECT)
-            return None
+        return None
 
     return allocate

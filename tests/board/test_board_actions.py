@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from reconros_zenoh.board.callback import HardwareThread
     from reconros_zenoh.board.profile import Profile
-    from reconros_zenoh.board.software import SoftwareContext
+    from reconros_zenoh.board.software import SoftwareCallback, SoftwareContext
     from reconros_zenoh.rmw.action_client import ActionEvent
     from reconros_zenoh.rmw.action_server import GoalHandle
 
@@ -202,6 +202,15 @@ class Asking:
     def hear_in_hardware(self, thread: HardwareThread) -> Steps:
         self.events.append((yield from thread.get_init_data()))
 
+    def failures_of(self, ask: SoftwareCallback) -> int:
+        """How often a callback of an executor of its own failed, which is called once."""
+        executor, tickets = Executor(self.board, 1, 0), Tickets(self.board)
+        executor.add_sw_callback("ask", SUB, tickets, ask)
+        executor.spin()
+        tickets.put(None)
+        self.board.environment.run(until=10**6)
+        return executor.failures["ask"]
+
     def accept(self, goal: Any) -> None:
         if goal.order % 2:
             raise BadMessageError("order", "odd")
@@ -289,12 +298,7 @@ def test_with_what_is_no_goal_id_nothing_of_the_call_is_sent(
         context.send_goal(case.client, case.client.goal(order=0))
         context.cancel_goal(case.client, goal_id)
 
-    executor, tickets = Executor(case.board, 1, 0), Tickets(case.board)
-    executor.add_sw_callback("ask", SUB, tickets, ask)
-    executor.spin()
-    tickets.put(None)
-    case.board.environment.run(until=10**6)
-    assert executor.failures == {"ask": 1}
+    assert case.failures_of(ask) == 1
     assert f"{goal_id!r} is no goal id. Give the 16 bytes that `send_goal` has returned." in caplog.text
     assert not case.handles
 
@@ -314,11 +318,6 @@ def test_with_a_goal_of_a_wrong_type_nothing_of_the_call_is_sent(caplog: pytest.
         context.send_goal(case.client, case.client.goal(order=0))
         context.send_goal(case.client, case.client.goal(order="many"))
 
-    executor, tickets = Executor(case.board, 1, 0), Tickets(case.board)
-    executor.add_sw_callback("ask", SUB, tickets, ask)
-    executor.spin()
-    tickets.put(None)
-    case.board.environment.run(until=10**6)
-    assert executor.failures == {"ask": 1}
+    assert case.failures_of(ask) == 1
     assert "Goal cannot be serialised" in caplog.text
     assert not case.handles
