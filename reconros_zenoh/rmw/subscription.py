@@ -43,7 +43,7 @@ class Subscription(Endpoint):
         self._check = check
         middle = self.key.split("/")[1:-1]
         self._subscription = self.context.transport.subscribe(
-            "/".join(("*", *middle, "*")), self._on_sample, qos
+            "/".join(("*", *middle, "*")), self._on_sample, qos, self.key
         )
         self.announce()
 

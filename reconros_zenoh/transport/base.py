@@ -116,10 +116,13 @@ class Transport(Protocol):
         With TRANSIENT_LOCAL its last `qos.depth` messages reach late subscribers, too.
         """
 
-    def subscribe(self, key: str, sink: Callable[[Sample], None], qos: QosProfile) -> Declaration:
+    def subscribe(
+        self, key: str, sink: Callable[[Sample], None], qos: QosProfile, usual_key: str | None = None
+    ) -> Declaration:
         """Hand every message whose key matches the key expression `key` to `sink`, in order per publisher.
 
-        With TRANSIENT_LOCAL the last `qos.depth` messages of each transient local publisher come first.
+        With TRANSIENT_LOCAL the last `qos.depth` messages of each transient local publisher come first. With
+        wildcards in `key`, messages on `usual_key` still cost no more than without.
         """
 
     def serve(self, key: str, sink: Callable[[Request], None]) -> Declaration:

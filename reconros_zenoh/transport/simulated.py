@@ -60,7 +60,13 @@ class SimulatedTransport(Closing):
         check_concrete(key)
         return _Publisher(self._enter(key), key, qos, on_matching)
 
-    def subscribe(self, key: str, sink: Callable[[Sample], None], qos: QosProfile) -> _Subscription:
+    def subscribe(
+        self,
+        key: str,
+        sink: Callable[[Sample], None],
+        qos: QosProfile,
+        usual_key: str | None = None,  # noqa: ARG002 # all keys cost the same
+    ) -> _Subscription:
         """Declare a subscription, see `Transport.subscribe`."""
         return _Subscription(self._enter(key), key, sink, qos)
 

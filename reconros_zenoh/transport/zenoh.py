@@ -71,6 +71,7 @@ class ZenohTransport(Closing):
         self.session = session
         self.declarations: set[_Declaration] = set()
         self.frames = Frames(open_pool)
+        self._kept_keys: dict[str, zenoh.KeyExpr] = {}
 
     @classmethod
     def open(cls, router: str, *, timeout_s: float = 3.0) -> Self:
@@ -91,9 +92,13 @@ class ZenohTransport(Closing):
         """Declare a publisher, see `Transport.publish`."""
         return _Publisher(self, key, qos, on_matching)
 
-    def subscribe(self, key: str, sink: Callable[[Sample], None], qos: QosProfile) -> _Declaration:
+    def subscribe(
+        self, key: str, sink: Callable[[Sample], None], qos: QosProfile, usual_key: str | None = None
+    ) -> _Declaration:
         """Declare a subscription, see `Transport.subscribe`."""
         declaration = _Declaration(self, key)
+        if usual_key is not None:
+            self._keep_route(usual_key)
         is_pattern = "*" in key
 
         def on_sample(sample: zenoh.Sample) -> None:
@@ -163,6 +168,18 @@ class ZenohTransport(Closing):
         handler = direct(on_sample)
         declaration.add(self.session.liveliness().declare_subscriber, key, handler, history=True)
         return declaration
+
+    def _keep_route(self, key: str) -> None:
+        """Have Zenoh know at once who gets a message on `key`, until the session ends.
+
+        For a key of which it only knows patterns it looks at all of them for each message, a tenth of a small
+        round trip. Not taken back earlier: messages on their way to another subscription may rely on it.
+        """
+        if key not in self._kept_keys:
+            try:
+                self._kept_keys[key] = self.session.declare_keyexpr(key)
+            except zenoh.ZError as error:
+                raise _failure(f"{key} cannot be declared", error) from error
 
     def close(self) -> None:
         """Close every declaration and the session. Idempotent."""

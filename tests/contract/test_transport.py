@@ -211,10 +211,13 @@ def test_a_reader_that_keeps_its_samples_stops_no_publisher(network: Network) ->
     assert [sample.payload for sample in inbox.items] == sent
 
 
-def test_a_wildcard_subscription_gets_every_matching_key(network: Network) -> None:
+@pytest.mark.parametrize("usual_key", [None, "0/a/type/hash", "0/c/type"])
+def test_a_wildcard_subscription_gets_every_matching_key(network: Network, usual_key: str | None) -> None:
     here, there = network.session(), network.session()
     inbox = network.inbox()
-    there.subscribe("0/*/type/**", lambda sample: inbox.put(sample.key, bytes(sample.payload)), DEFAULT)
+    there.subscribe(
+        "0/*/type/**", lambda sample: inbox.put(sample.key, bytes(sample.payload)), DEFAULT, usual_key
+    )
     know(network, here, there)
 
     for key in ("0/a/type/hash", "1/a/type/hash", "0/a/b/type/hash", "0/b/type"):
