@@ -12,7 +12,7 @@ from reconros_zenoh.board.dds import DdsStack
 from reconros_zenoh.board.endpoints import TopicWriter
 from reconros_zenoh.board.gateway import Gateway
 from reconros_zenoh.board.hmt import HardwareTopic, hmt_key
-from reconros_zenoh.board.host import IN_LINE_NS, Host
+from reconros_zenoh.board.host import Host
 from reconros_zenoh.board.local_topics import LocalTopics, LocalTopicWriter
 from reconros_zenoh.board.memif import Memif
 from reconros_zenoh.board.osif import Osif
@@ -89,7 +89,7 @@ class Board:
         self.randomness = random.Random(f"{seed} {name}")
         self.dds = DdsStack(environment, self.cpu, model, self.randomness)
         # Without a model no event has a time that it could miss.
-        self.host = Host(environment, threads, IN_LINE_NS if model else 10 * IN_LINE_NS)
+        self.host = Host(environment, threads, modelled=model is not None)
         self.spans = Spans()
         self.topics = LocalTopics(self, model, model.topics) if model and model.topics else None
         self.writers: list[TopicWriter] = []

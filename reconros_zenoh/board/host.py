@@ -25,8 +25,9 @@ if TYPE_CHECKING:
 R = TypeVar("R")
 R_co = TypeVar("R_co", covariant=True)
 _RESULTS_KEPT = 512
+_CONSTANTS_KEPT = 8
 _RUNS_REMEMBERED = 32
-IN_LINE_NS = 100_000
+_IN_LINE_NS = 100_000
 """About what it costs to hand a computation to another thread and its result back."""
 
 
@@ -79,20 +80,23 @@ class Host:
     """Runs the real computation while the model decides when its result is ready.
 
     In wall time what takes long runs in a pool of threads, what is known to be over soon in line. In virtual
-    time everything runs in line, and a pure kernel computes equal inputs once for all boards of the process.
+    time everything runs in line, and a pure kernel computes equal inputs once for all boards of the process;
+    in wall time only what nobody can change is known to be equal, because comparing takes time, too.
     """
 
     def __init__(
-        self, environment: VirtualEnvironment, threads: int | None, in_line_ns: int = IN_LINE_NS
+        self, environment: VirtualEnvironment, threads: int | None, *, modelled: bool = True
     ) -> None:
         """`threads` is the size of the pool, None in virtual time.
 
-        What is expected to take less than `in_line_ns` runs in line: it holds up the event loop that long.
+        Not `modelled`, every computation is real, and the event loop may be held up longer by one in line.
         """
         self._environment = environment
-        self._in_line_ns = in_line_ns
+        # What is expected to take less runs in line: it holds up the event loop that long.
+        self._in_line_ns = _IN_LINE_NS if modelled else 10 * _IN_LINE_NS
         self._pool = None if threads is None else ThreadPool(threads, "computation")
         self._expected_ns: dict[object, float] = {}
+        self._of_constants = _Results(_CONSTANTS_KEPT) if modelled else None
         self.overruns = Overruns()
 
     def start(
@@ -162,11 +166,13 @@ class Host:
     def compute(self, kernel: Callable[..., R], *arguments: object) -> R:
         """Return `kernel(*arguments)` of a pure kernel; called in the thread of a started computation.
 
-        Arrays that it returns are read-only: in virtual time others may get the same ones.
+        Arrays that it returns are read-only: others may get the same ones.
         """
-        if self._pool is not None:
-            return _frozen(kernel(*arguments), arguments)
-        return _results.of(kernel, *arguments)
+        if self._pool is None:
+            return _results.of(kernel, *arguments)
+        if self._of_constants is not None and all(map(_is_constant, arguments)):
+            return self._of_constants.of(kernel, *arguments)
+        return computed(kernel, *arguments)
 
     def forget_overruns(self) -> None:
         """Count overruns from here on."""
@@ -195,6 +201,11 @@ def measured(function: Callable[..., R], *arguments: object) -> tuple[R, int]:
     return function(*arguments), time.perf_counter_ns() - started_ns
 
 
+def computed(kernel: Callable[..., R], *arguments: object) -> R:
+    """Return `kernel(*arguments)`, computed now; its arrays are read-only."""
+    return _frozen(kernel(*arguments), arguments)
+
+
 def _frozen(result: R, arguments: tuple[object, ...]) -> R:
     """Return a result whose arrays nobody can change; one that the kernel has made need not be copied."""
     if type(result) is tuple:
@@ -210,7 +221,8 @@ def _frozen(result: R, arguments: tuple[object, ...]) -> R:
 class _Results:
     """The results of pure kernels that were asked for last."""
 
-    def __init__(self) -> None:
+    def __init__(self, most: int) -> None:
+        self._most = most
         self._kept: OrderedDict[object, object] = OrderedDict()
         self._lock = threading.Lock()
 
@@ -220,20 +232,20 @@ class _Results:
         try:
             hash(key)
         except TypeError:
-            return _frozen(kernel(*arguments), arguments)
+            return computed(kernel, *arguments)
         with self._lock:
             if key in self._kept:
                 self._kept.move_to_end(key)
                 return self._kept[key]  # type: ignore[return-value] # stored below under the same kernel
-        result = _frozen(kernel(*arguments), arguments)
+        result = computed(kernel, *arguments)
         with self._lock:
             self._kept[key] = result
-            if len(self._kept) > _RESULTS_KEPT:
+            if len(self._kept) > self._most:
                 self._kept.popitem(last=False)
         return result
 
 
-_results = _Results()
+_results = _Results(_RESULTS_KEPT)
 
 
 class _Unchanging:
@@ -251,13 +263,18 @@ class _Unchanging:
         return isinstance(other, _Unchanging) and other._array is self._array
 
 
+def _is_constant(argument: object) -> bool:
+    """Whether nobody can change the argument, or it is no array."""
+    return not isinstance(argument, np.ndarray) or (argument.base is None and not argument.flags.writeable)
+
+
 def _identity(argument: object) -> object:
     """Return something equal for equal arguments: arrays by shape, type and a hash of their content.
 
     Numbers of different types are different, as a kernel may overflow with one of them.
     """
     if isinstance(argument, np.ndarray):
-        if argument.base is None and not argument.flags.writeable:
+        if _is_constant(argument):
             return _Unchanging(argument)
         content = np.ascontiguousarray(argument)
         return argument.shape, argument.dtype.str, xxhash.xxh3_128_digest(content.data)

@@ -77,7 +77,7 @@ class SoftwareContext:
         return self._board.environment.clock_ns()
 
     def compute(self, kernel: Callable[..., R], *arguments: object) -> R:
-        """Return `kernel(*arguments)` of a pure kernel, which need not be computed twice in virtual time."""
+        """Return `kernel(*arguments)` of a pure kernel, which a modelled board need not compute twice."""
         if self._really:
             return kernel(*arguments)
         return self._board.host.compute(kernel, *arguments)

@@ -213,6 +213,25 @@ def test_an_array_that_nobody_can_change_is_known_without_a_look_at_its_content(
     assert kernel.calls == 2
 
 
+@pytest.mark.parametrize(("modelled", "calls"), [(True, 1), (False, 2)])
+def test_in_wall_time_a_model_computes_what_nobody_can_change_once(modelled: bool, calls: int) -> None:
+    host = Host(WallEnvironment(), threads=1, modelled=modelled)
+    kernel = Counting(np.sum)
+    source = read_only([1, 2])
+    assert [host.compute(kernel, source) for _ in range(2)] == [3, 3]
+    assert kernel.calls == calls
+    host.close()
+
+
+def test_in_wall_time_what_a_message_brings_is_computed_each_time() -> None:
+    host = Host(WallEnvironment(), threads=1)
+    kernel = Counting(np.sum)
+    received = np.frombuffer(bytes([1, 2]), np.uint8)
+    assert [host.compute(kernel, received) for _ in range(2)] == [3, 3]
+    assert kernel.calls == 2
+    host.close()
+
+
 def test_a_read_only_view_of_an_array_that_changes_is_computed_anew() -> None:
     host = Host(VirtualEnvironment(), threads=None)
     kernel = Counting(np.sum)
