@@ -39,7 +39,7 @@ COPIES = [
         "gateway: the publisher copies it once; the board copies it out once, and each hardware node gets a "
         "read-only view of that copy; the software subscriber copies it out."
     ),
-    "Below 256 KiB Zenoh itself makes the copy into shared memory; below 3 kB it goes through sockets.",
+    "Below 256 KiB Zenoh itself makes the copy into shared memory; below 32 KiB it goes through sockets.",
 ]
 
 K = TypeVar("K")

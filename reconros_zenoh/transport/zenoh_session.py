@@ -23,6 +23,10 @@ if TYPE_CHECKING:
 # A socket is watched by the pool that accepted it: were `acc` elsewhere, a message would wake a thread more.
 _THREADS = "(rx: (handover: net), tx: (handover: net), acc: (handover: net), net: (worker_threads: 4))"
 
+# From here on [byte] Zenoh hands messages over by shared memory. A round trip of 16 KiB took 0.20 ms with it and
+# 0.18 without, 32 KiB 0.20 both, 64 KiB 0.23 and 0.28; Zenoh begins at 3 KiB.
+_SHARED_FROM = 32 * 1024
+
 _COLLECT = GarbageCollect()
 
 _T = TypeVar("_T")
@@ -44,6 +48,8 @@ def configuration(mode: str, endpoints: dict[str, str]) -> zenoh.Config:
     # With shared memory switched on and none to be had, a session does not open.
     shared = sys.platform != "linux" or os.access("/dev/shm", os.W_OK)  # noqa: S108 # only looked at
     config.insert_json5("transport/shared_memory/enabled", json.dumps(shared))
+    optimization = "transport/shared_memory/transport_optimization"
+    config.insert_json5(f"{optimization}/message_size_threshold", json.dumps(_SHARED_FROM))
     return config
 
 
