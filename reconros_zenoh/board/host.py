@@ -26,6 +26,7 @@ R = TypeVar("R")
 R_co = TypeVar("R_co", covariant=True)
 _RESULTS_KEPT = 512
 _CONSTANTS_KEPT = 8
+_VALUES = (int, float, complex, str, bytes, np.generic, type(None))
 _RUNS_REMEMBERED = 32
 _IN_LINE_NS = 100_000
 """About what it costs to hand a computation to another thread and its result back."""
@@ -81,7 +82,7 @@ class Host:
 
     In wall time what takes long runs in a pool of threads, what is known to be over soon in line. In virtual
     time everything runs in line, and a pure kernel computes equal inputs once for all boards of the process;
-    in wall time only what nobody can change is known to be equal, because comparing takes time, too.
+    in wall time only an array that nobody can change is known to be equal: comparing takes time, too.
     """
 
     def __init__(
@@ -227,9 +228,9 @@ class _Results:
         self._lock = threading.Lock()
 
     def of(self, kernel: Callable[..., R], *arguments: object) -> R:
-        """Return `kernel(*arguments)`, computed unless it is known; it never is for a list or a message."""
-        key = (kernel, *(_identity(argument) for argument in arguments))
+        """Return `kernel(*arguments)`, computed unless it is known; of what may change it never is."""
         try:
+            key = (kernel, *(_identity(argument) for argument in arguments))
             hash(key)
         except TypeError:
             return computed(kernel, *arguments)
@@ -264,18 +265,21 @@ class _Unchanging:
 
 
 def _is_constant(argument: object) -> bool:
-    """Whether nobody can change the argument, or it is no array."""
-    return not isinstance(argument, np.ndarray) or (argument.base is None and not argument.flags.writeable)
+    """Whether the argument is an array that nobody can change."""
+    return isinstance(argument, np.ndarray) and argument.base is None and not argument.flags.writeable
 
 
 def _identity(argument: object) -> object:
     """Return something equal for equal arguments: arrays by shape, type and a hash of their content.
 
-    Numbers of different types are different, as a kernel may overflow with one of them.
+    Numbers of different types are different, as a kernel may overflow with one of them. Raise TypeError for
+    what may change while it stays equal to itself.
     """
     if isinstance(argument, np.ndarray):
         if _is_constant(argument):
             return _Unchanging(argument)
         content = np.ascontiguousarray(argument)
         return argument.shape, argument.dtype.str, xxhash.xxh3_128_digest(content.data)
+    if not isinstance(argument, _VALUES):
+        raise TypeError(f"{type(argument).__name__} may change")
     return type(argument), argument

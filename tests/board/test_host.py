@@ -1,9 +1,10 @@
-"""Where computations really run: overruns are counted, results are remembered in virtual time only."""
+"""Where computations really run: overruns are counted, and what is known need not be computed again."""
 
 from __future__ import annotations
 
 import threading
 from contextlib import contextmanager
+from operator import attrgetter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -160,7 +161,7 @@ def test_in_virtual_time_equal_inputs_are_computed_once() -> None:
     assert kernel.calls == 1
 
 
-def test_in_wall_time_everything_is_computed() -> None:
+def test_in_wall_time_what_may_change_is_computed_each_time() -> None:
     with wall_host() as (_, host):
         kernel = Counting(np.sort)
         for _ in range(3):
@@ -297,6 +298,15 @@ def test_what_has_no_hash_is_computed_each_time(threads: int | None) -> None:
     assert host.compute(kernel, numbers) == 3
     assert kernel.calls == 2
     host.close()
+
+
+def test_of_an_object_that_may_change_it_is_computed_each_time() -> None:
+    host = Host(VirtualEnvironment(), threads=None)
+    counting = Counting(abs)  # it has a hash, that of its identity
+    calls = attrgetter("calls")
+    assert host.compute(calls, counting) == 0
+    counting(7)
+    assert host.compute(calls, counting) == 1
 
 
 def test_two_kernels_do_not_share_results() -> None:
