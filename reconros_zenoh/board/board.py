@@ -115,7 +115,7 @@ class Board:
         *,
         in_place: bool = False,
     ) -> TopicWriter:
-        """Return a new publisher on a software-mapped topic; `in_place` as in `LocalTopics.publish`."""
+        """Return a new publisher on a software-mapped topic; `in_place` says that readers copy nothing."""
         if self.topics is None:
             writer = TopicWriter(self, node, message_type, topic, qos)
         else:

@@ -8,10 +8,11 @@ fitted to its speedups.
 
 from __future__ import annotations
 
-from collections import defaultdict
+from collections import defaultdict, deque
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from reconros_zenoh.board.endpoints import TopicWriter
+from reconros_zenoh.board.spans import Timeline
 from reconros_zenoh.board.stream import Stream
 from reconros_zenoh.rmw.received import Received
 from reconros_zenoh.ros.graph import EndpointKind, EndpointToken, parse, tokens_expression
@@ -26,11 +27,22 @@ if TYPE_CHECKING:
     from reconros_zenoh.board.endpoints import SubscriptionSource
     from reconros_zenoh.board.osif import Osif
     from reconros_zenoh.board.profile import Model, TopicsSection
-    from reconros_zenoh.board.spans import Timeline
     from reconros_zenoh.clock.activity import Awaitable
     from reconros_zenoh.rmw.node import Node
     from reconros_zenoh.ros.types import MessageType
     from reconros_zenoh.transport.base import Parts
+
+
+class _Publication(NamedTuple):
+    """A message for the readers of the board; `hardware` says where its publisher is.
+
+    `in_place`: the publisher has written it where software readers find it, so they copy nothing. Hardware
+    readers then fetch it over the MEMIF themselves.
+    """
+
+    received: Received
+    hardware: bool
+    in_place: bool
 
 
 class LocalTopics:
@@ -45,6 +57,7 @@ class LocalTopics:
         self._copy_out = section.copy_out.ns_per_byte
         self._memif_ns_per_byte = 1 / model.memif.bandwidth.bytes_per_ns
         self._readers: defaultdict[str, list[SubscriptionSource]] = defaultdict(list)
+        self._writers: defaultdict[str, list[LocalTopicWriter]] = defaultdict(list)
         self._elsewhere: defaultdict[str, set[str]] = defaultdict(set)
         self.publishers: set[bytes] = set()
         context = board.context
@@ -54,46 +67,69 @@ class LocalTopics:
         )
 
     def add_reader(self, key: str, reader: SubscriptionSource) -> None:
-        """Let what is published on this key on the board reach the reader from now on."""
+        """Let what is published on this key on the board reach the reader from now on.
+
+        With TRANSIENT_LOCAL it first gets the last `depth` messages of each writer that keeps some. They are
+        published already: each costs what waking a hardware reader takes, or its way to a software reader.
+        """
         self._readers[key].append(reader)
+        qos = reader._qos  # noqa: SLF001 - a reader tells nobody its QoS, and nobody else asks
+        if qos.durability is Durability.TRANSIENT_LOCAL:
+            for writer in self._writers[key]:
+                for publication in deque(writer.kept, qos.depth):
+                    timeline = Timeline(self._board.environment, self._board.environment.now)
+                    if reader.in_hardware:
+                        way = self._work(self._notify_ns, timeline)
+                    else:
+                        way = self._way_to_software(publication, 0, timeline)
+                    reader.deliver(publication.received, timeline, way)
+
+    def add_writer(self, writer: LocalTopicWriter) -> None:
+        """Let readers that come later have what the writer keeps, and have its messages from it alone."""
+        self._writers[writer.key].append(writer)
+        self.publishers.add(writer.gid)
 
     def is_read_elsewhere(self, key: str) -> bool:
         """Tell whether another session subscribes to the key."""
         return bool(self._elsewhere[key])
 
     def publish(
-        self, key: str, received: Received, timeline: Timeline, *, hardware: bool, in_place: bool = False
+        self, key: str, publication: _Publication, timeline: Timeline
     ) -> Generator[Awaitable, object, None]:
-        """Return when the publication is over; its readers go on from there.
-
-        `hardware` says where the publisher is. `in_place`: it has written the message where software readers
-        find it, so they copy nothing. Hardware readers then fetch it over the MEMIF themselves.
-        """
-        cpu, size = self._board.cpu, received.size
+        """Return when the publication is over; its readers go on from there."""
+        cpu, received = self._board.cpu, publication.received
         readers = self._readers[key]
-        in_hardware = [reader for reader in readers if reader.in_hardware]
-        yield from cpu.run(self._publish_ns + (0 if hardware else size * self._copy_in))
-        notify_ns = self._notify_ns if hardware else self._notify_software_ns
-        for _ in in_hardware:
+        woken = sum(reader.in_hardware for reader in readers)
+        copy_ns = 0 if publication.hardware else received.size * self._copy_in
+        yield from cpu.run(self._publish_ns + copy_ns)
+        notify_ns = self._notify_ns if publication.hardware else self._notify_software_ns
+        for _ in range(woken):
             yield from cpu.run(notify_ns)
         timeline.mark("dds")
         # What is left of waking the hardware readers is their delegates' work, not the publisher's.
-        rest_ns = len(in_hardware) * max(0, self._notify_ns - notify_ns)
+        rest_ns = woken * max(0, self._notify_ns - notify_ns)
         for reader in readers:
-            way = timeline.fork()
+            fork = timeline.fork()
             if reader.in_hardware:
-                steps = self._wait(rest_ns, way)
-            elif in_place:
-                steps = self._wait(0, way)
-            elif hardware:
-                steps = self._wait(round(size * self._memif_ns_per_byte), way)
+                way = self._wait(rest_ns, fork)
             else:
-                steps = self._copy(size * self._copy_out * len(in_hardware), way)
-            reader.deliver(received, way, steps)
+                way = self._way_to_software(publication, woken, fork)
+            reader.deliver(received, fork, way)
 
     def close(self) -> None:
         """Look at the graph no longer."""
         self._watch.close()
+
+    def _way_to_software(
+        self, publication: _Publication, woken: int, timeline: Timeline
+    ) -> Generator[Awaitable, object, bool]:
+        """Return the way to a software reader beside so many hardware readers of the same message."""
+        size = publication.received.size
+        if publication.in_place:
+            return self._wait(0, timeline)
+        if publication.hardware:
+            return self._wait(round(size * self._memif_ns_per_byte), timeline)
+        return self._work(size * self._copy_out * woken, timeline)
 
     def _wait(self, duration_ns: int, timeline: Timeline) -> Generator[Awaitable, object, bool]:
         if duration_ns:
@@ -101,7 +137,7 @@ class LocalTopics:
             timeline.mark("dds")
         return True
 
-    def _copy(self, core_time_ns: float, timeline: Timeline) -> Generator[Awaitable, object, bool]:
+    def _work(self, core_time_ns: float, timeline: Timeline) -> Generator[Awaitable, object, bool]:
         yield from self._board.cpu.run(core_time_ns)
         timeline.mark("dds")
         return True
@@ -126,8 +162,9 @@ class _Sent(NamedTuple):
 class LocalTopicWriter(TopicWriter):
     """A publisher of a board that knows what its own topics cost; stack and link only for readers elsewhere.
 
-    With TRANSIENT_LOCAL every message goes through them, because such a reader may come later. All
-    readers get one copy of the message as it was when it was published; its arrays are read-only.
+    With TRANSIENT_LOCAL every message goes through them, because such a reader may come later; for readers of
+    the board that do, the last `depth` are `kept`. All readers get one copy of the message as it was when it
+    was published; its arrays are read-only.
     """
 
     def __init__(
@@ -145,10 +182,11 @@ class LocalTopicWriter(TopicWriter):
         super().__init__(board, node, message_type, topic, qos)
         self._topics = topics
         self._in_place = in_place
-        # The transport keeps what is sent for those who come late.
+        # The transport keeps what is sent for those who come late elsewhere.
         self._is_kept = qos.durability is Durability.TRANSIENT_LOCAL
         self._publications: Stream[_Sent] = Stream(self._publish_from_software, qos.queue_depth)
-        topics.publishers.add(self.gid)
+        self.kept: deque[_Publication] = deque(maxlen=qos.depth if self._is_kept else 0)
+        topics.add_writer(self)
 
     @property
     def dropped(self) -> int:
@@ -177,8 +215,8 @@ class LocalTopicWriter(TopicWriter):
 
     def _publish(self, sent: _Sent, *, hardware: bool) -> Generator[Awaitable, object, None]:
         received = Received(sent.message, sum(map(len, sent.parts)), 0, publisher=self.gid)
-        yield from self._topics.publish(
-            self.key, received, sent.timeline, hardware=hardware, in_place=self._in_place
-        )
+        publication = _Publication(received, hardware, self._in_place)
+        yield from self._topics.publish(self.key, publication, sent.timeline)
+        self.kept.append(publication)
         if self._is_kept or self._topics.is_read_elsewhere(self.key):
             super().send(sent.parts, sent.timeline)

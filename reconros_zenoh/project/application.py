@@ -255,8 +255,12 @@ class Application:
     def spin(self, executor: Executor | None = None) -> None:
         """Start the gateways and the workers of an executor of one's own or of the one `register` has filled.
 
-        It is the one that the board reports on.
+        It is the one that the board reports on. Raises UsageError the second time.
         """
+        if self.executor is not None:
+            raise UsageError(
+                "the executor spins already. Call app.spin() once, when all callbacks are added."
+            )
         self.executor = executor or self._mapped
         if self.executor is None:
             raise UsageError("app.spin() without a callback. Call app.register(...) first.")

@@ -103,29 +103,42 @@ def gateway_slots(
     """Return the id of the slot that each gateway has for itself: one that no callback is mapped to.
 
     Of the slots that a gateway can be built for it is the first, if possible one that no thread is built for;
-    gateways with few of them choose first. Raise FileError at the line of a gateway that none is left for.
+    gateways with few of them choose first. One that finds them taken lets another gateway move, so that as
+    many as possible have one (a maximum matching by augmenting paths). Raise FileError at the line of the
+    first gateway that none is left for, naming all of them.
     """
     threads = {slot for thread in configuration.threads if thread.hardware for slot in thread.slots}
     tenants = {slot: f"the callback {name}" for name, mapped in callbacks.items() for slot in mapped.slots}
-    slots: dict[str, int] = {}
+    holders: dict[int, RosGateway] = {}
+
+    def seat(gateway: RosGateway, asked: set[int]) -> bool:
+        own = [slot for slot in gateway.slots if slot not in tenants]
+        for slot in sorted(own, key=lambda slot: (slot in holders, slot in threads)):
+            if slot not in asked:
+                asked.add(slot)
+                if slot not in holders or seat(holders[slot], asked):
+                    holders[slot] = gateway
+                    return True
+        return False
+
     for gateway in sorted(configuration.gateways, key=lambda gateway: len(gateway.slots)):
-        free = [slot for slot in gateway.slots if slot not in tenants]
-        if not free:
-            others = dict.fromkeys(tenants[slot] for slot in gateway.slots)
-            raise FileError(
-                configuration.path,
-                gateway.line,
-                f"The gateway {gateway.name} has no slot for itself: "
-                + (
-                    f"its Slot names only those of {' and '.join(others)}."
-                    if others
-                    else "its Slot names none."
-                ),
-                "Name another one there.",
-            )
-        slots[gateway.name] = min(free, key=lambda slot: slot in threads)
-        tenants[slots[gateway.name]] = f"the gateway {gateway.name}"
-    return slots
+        seat(gateway, set())
+    left = [gateway for gateway in configuration.gateways if gateway not in holders.values()]
+    if left:
+        tenants.update((slot, f"the gateway {gateway.name}") for slot, gateway in holders.items())
+        raise FileError(
+            configuration.path,
+            left[0].line,
+            " ".join(_without_slot(gateway, tenants) for gateway in left),
+            "Name another one there.",
+        )
+    return {gateway.name: slot for slot, gateway in holders.items()}
+
+
+def _without_slot(gateway: RosGateway, tenants: Mapping[int, str]) -> str:
+    others = " and ".join(dict.fromkeys(tenants[slot] for slot in gateway.slots))
+    named = f"only those of {others}" if others else "none"
+    return f"The gateway {gateway.name} has no slot for itself: its Slot names {named}."
 
 
 def _check_ends(configuration: BuildConfiguration, topic: str, ends: list[Resource]) -> None:

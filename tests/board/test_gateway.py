@@ -218,6 +218,21 @@ def test_its_ends_have_its_qos() -> None:
     assert ends == {EndpointKind.PUBLISHER: qos, EndpointKind.SUBSCRIPTION: qos}
 
 
+def test_one_that_is_added_late_gets_what_a_publisher_of_its_board_keeps() -> None:
+    board = small_board(modelled(), 2)
+    qos = QosProfile(durability=Durability.TRANSIENT_LOCAL, depth=2)
+    writer = board.writer(board.context.node("n"), words, "/a", qos)
+    for number in range(5):
+        writer.send(writer.encode(message(number)), Timeline(board.environment, board.environment.now))
+        board.environment.run()
+    heard: list[int] = []
+    fifo = Fifo(FifoPlan(), lambda: heard.append(int(fifo.take().message.data[0])), None, cut_through=False)
+    board.hardware_topic("/a", words).subscribe(fifo)
+    board.add_gateway("late", "/a", "/a", words, 0, qos, at_power_up=False)
+    board.environment.run()
+    assert heard == [3, 4]
+
+
 def test_with_a_short_queue_it_keeps_the_newest() -> None:
     side = Side(small_board(modelled(), 2), qos=QosProfile(depth=1))
     nobody_takes = Fifo(FifoPlan(depth=1), lambda: None, None, cut_through=False)

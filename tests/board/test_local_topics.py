@@ -5,6 +5,7 @@ The constants are powers of ten apart, so that a sum tells what it is made of. T
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,6 +20,7 @@ from reconros_zenoh.clock.activity import Activity
 from reconros_zenoh.errors import BadMessageError
 from reconros_zenoh.executor.callbacks import CallbackKind
 from reconros_zenoh.gateway.filters import PublisherFilter
+from reconros_zenoh.ros.qos import Durability, QosProfile
 
 if TYPE_CHECKING:
     from small_board import Steps
@@ -207,3 +209,80 @@ def test_a_reader_that_is_too_slow_keeps_the_last() -> None:
     for _ in range(12):
         setup.publish(hardware=False)
     assert lazy.dropped == 2
+
+
+LATCHED = QosProfile(durability=Durability.TRANSIENT_LOCAL, depth=3)
+
+
+class Late:
+    """What a reader of the board gets that comes when five messages were published, and when."""
+
+    def __init__(
+        self, *, from_hardware: bool, to_hardware: bool, writer: QosProfile, reader: QosProfile
+    ) -> None:
+        self.board = small_board(small_profile(topics=TOPICS, cores=4, link_ns=50))
+        self.environment = self.board.environment
+        self.from_hardware = from_hardware
+        node = self.board.context.node("n")
+        self.writer = self.board.writer(node, words, "/a", writer)
+        for number in range(5):
+            self.publish(number)
+            self.environment.run()
+        self.source = SubscriptionSource(self.board, node, words, "/a", reader, in_hardware=to_hardware)
+        self.started_ns = self.environment.now
+        self.got: list[tuple[int, int]] = []
+        self.source.open(self.note, None)
+
+    def publish(self, number: int) -> None:
+        body = words.cls(layout=layout, data=np.full(U, number, np.uint8))
+        timeline = Timeline(self.environment, self.environment.now)
+        if self.from_hardware:
+            Activity(self.writer.publish(body, self.board.osif, timeline))
+        else:
+            self.writer.send(self.writer.encode(body), timeline)
+
+    def note(self) -> None:
+        event = self.source.take()
+        assert event.timeline.total_ns == self.environment.now - self.started_ns
+        self.got.append((self.environment.now - self.started_ns, int(event.message.data[0])))
+
+
+@pytest.mark.parametrize(
+    ("from_hardware", "to_hardware", "each_ns"),
+    [(True, True, D), (False, True, D), (True, False, U + HEADER), (False, False, 0)],
+)
+def test_a_late_reader_gets_what_is_kept_and_only_its_way_costs_time(
+    from_hardware: bool, to_hardware: bool, each_ns: int
+) -> None:
+    late = Late(from_hardware=from_hardware, to_hardware=to_hardware, writer=LATCHED, reader=LATCHED)
+    late.environment.run()
+    assert late.got == [(each_ns, 2), (2 * each_ns, 3), (3 * each_ns, 4)]
+    assert late.source.dropped == 0
+
+
+def test_what_a_writer_keeps_comes_before_what_it_publishes_next() -> None:
+    late = Late(from_hardware=True, to_hardware=True, writer=LATCHED, reader=LATCHED)
+    late.publish(5)
+    late.environment.run()
+    assert [number for _, number in late.got] == [2, 3, 4, 5]
+
+
+VOLATILE = QosProfile(depth=3)
+
+
+@pytest.mark.parametrize(
+    ("writer", "reader", "numbers"),
+    [
+        (LATCHED, replace(LATCHED, depth=1), [4]),
+        (replace(LATCHED, depth=1), LATCHED, [4]),
+        (LATCHED, VOLATILE, []),
+        (VOLATILE, LATCHED, []),
+    ],
+)
+def test_a_late_reader_gets_as_many_as_it_wants_and_the_writer_keeps(
+    writer: QosProfile, reader: QosProfile, numbers: list[int]
+) -> None:
+    late = Late(from_hardware=False, to_hardware=False, writer=writer, reader=reader)
+    late.environment.run()
+    assert [number for _, number in late.got] == numbers
+    assert late.source.dropped == 0

@@ -170,6 +170,18 @@ def test_a_mistake_is_named_with_its_place(
     assert sys.path == places
 
 
+def test_a_second_spin_beside_a_gateway(tmp_path: Path) -> None:
+    folder = tmp_path / "blink"
+    new_project(folder)
+    with (folder / "build.cfg").open("a", encoding="utf-8") as file:
+        file.write("[HwSlot@more(0:0)]\nId = 1\n" + GATEWAY.replace("Cuont", "Count"))
+    start(folder)
+    with (folder / "main.py").open("a", encoding="utf-8") as file:
+        file.write("    app.spin()\n")
+    with pytest.raises(FileError, match=r"main\.py:10: the executor spins already\. Call app\.spin\(\) once"):
+        start(folder)
+
+
 def test_a_callback_of_ones_own_executor_that_is_not_in_build_cfg(tmp_path: Path) -> None:
     folder = tmp_path / "blink"
     new_project(folder)
