@@ -186,8 +186,8 @@ class SubscriptionSource(Reader):
         own: PublisherFilter | None = None,
         in_hardware: bool = False,
     ) -> None:
-        self._qos = qos or QosProfile()
-        super().__init__(board, message_type, self._qos)
+        self.qos = qos or QosProfile()
+        super().__init__(board, message_type, self.qos)
         self.in_hardware = in_hardware
         self._own = own
         self._check: Callable[[Any], None] | None = None
@@ -199,7 +199,7 @@ class SubscriptionSource(Reader):
         """Subscribe."""
         self._on_ready = on_ready
         self._check = check
-        subscription = self._node.subscription(self._type, self._topic, self.arrive, self._qos, check)
+        subscription = self._node.subscription(self._type, self._topic, self.arrive, self.qos, check)
         if self._board.topics is not None:
             self._board.topics.add_reader(subscription.key, self)
 

@@ -81,7 +81,8 @@ class Executor:
             )
         if hardware_workers > len(board.slots):
             raise UsageError(
-                f"{hardware_workers} hardware workers need as many slots, the project has {len(board.slots)}."
+                f"hardware_workers = {hardware_workers} is more than the slots of the project: "
+                f"{len(board.slots)}."
             )
         if kind == "standard" and hardware_workers:
             raise UsageError('the standard executor has no hardware workers; use executor = "reconros".')

@@ -73,10 +73,9 @@ class LocalTopics:
         published already: each costs what waking a hardware reader takes, or its way to a software reader.
         """
         self._readers[key].append(reader)
-        qos = reader._qos  # noqa: SLF001 - a reader tells nobody its QoS, and nobody else asks
-        if qos.durability is Durability.TRANSIENT_LOCAL:
+        if reader.qos.durability is Durability.TRANSIENT_LOCAL:
             for writer in self._writers[key]:
-                for publication in deque(writer.kept, qos.depth):
+                for publication in deque(writer.kept, reader.qos.depth):
                     timeline = Timeline(self._board.environment, self._board.environment.now)
                     if reader.in_hardware:
                         way = self._work(self._notify_ns, timeline)

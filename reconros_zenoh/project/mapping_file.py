@@ -116,7 +116,8 @@ def _check_workers(toml: TomlFile, mapping: Mapping, slots: Collection[int]) -> 
         raise FileError(
             toml.path,
             toml.line(["hardware_workers"]),
-            f"There are {mapping.hardware_workers} hardware workers, but the project has {len(slots)} slots.",
+            f"hardware_workers = {mapping.hardware_workers} is more than the slots of the project: "
+            f"{len(slots)}.",
             "Give at most one for each slot.",
         )
     if mapping.hardware_workers and mapping.executor == "standard":

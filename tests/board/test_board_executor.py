@@ -22,7 +22,7 @@ SUB = CallbackKind.SUB
 
 
 def test_every_hardware_worker_needs_a_slot() -> None:
-    with pytest.raises(UsageError, match="3 hardware workers need as many slots, the project has 2"):
+    with pytest.raises(UsageError, match="hardware_workers = 3 is more than the slots of the project: 2"):
         Executor(small_board(PROFILE, 2), 0, 3)
 
 

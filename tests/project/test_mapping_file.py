@@ -116,7 +116,7 @@ MISTAKES = {
     "more hardware workers than slots": (
         "hardware_workers = 3\n" + GOOD,
         1,
-        "3 hardware workers, but the project has 2 slots",
+        "hardware_workers = 3 is more than the slots of the project: 2",
     ),
     "hardware workers under the standard executor": (
         'hardware_workers = 1\nexecutor = "standard"\n' + GOOD.split("\n", 1)[1],

@@ -129,7 +129,7 @@ MISTAKES = {
         "software_workers = 2",
         "software_workers = 2\nhardware_workers = 2",
         "mappings/hardware.toml:3",
-        "2 hardware workers, but the project has 1 slots",
+        "hardware_workers = 2 is more than the slots of the project: 1",
     ),
     "syntax of a message": (
         "msg/blink_msgs/msg/Count.msg",
