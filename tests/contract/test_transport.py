@@ -15,6 +15,7 @@ import pytest
 from reconros_zenoh.clock.virtual import VirtualEnvironment
 from reconros_zenoh.errors import TransportError, UsageError
 from reconros_zenoh.ros.qos import Durability, History, QosProfile, Reliability
+from reconros_zenoh.transport import frames, zenoh_session
 from reconros_zenoh.transport.simulated import SimulatedNetwork
 from reconros_zenoh.transport.zenoh import ZenohRouter, ZenohTransport
 
@@ -627,6 +628,28 @@ def test_a_publisher_is_closed_while_another_thread_sends(router: str) -> None:
         thread.join(LIMIT_S)
         assert not thread.is_alive()
         assert KEY in str(refused[0])
+
+
+def test_a_callback_may_publish_what_no_shared_memory_takes(
+    router: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(zenoh_session, "_SHARED_FROM", 2**30)
+    monkeypatch.setattr(frames, "_SMALLEST_FRAME_BYTES", 2**30)
+    whole = QosProfile(history=History.KEEP_ALL)  # waits rather than loses
+    inbox = Inbox(Condition())
+    with ZenohTransport.open(router) as here, ZenohTransport.open(router) as there:
+        asked, answered = Event(), Event()
+        echo = there.publish("echo", whole, lambda matching: answered.set() if matching else None)
+        there.subscribe(KEY, lambda sample: echo.put([sample.payload], None), whole)
+        here.subscribe("echo", lambda sample: inbox.put(len(sample.payload)), whole)
+        publisher = here.publish(KEY, whole, lambda matching: asked.set() if matching else None)
+        assert asked.wait(LIMIT_S)
+        assert answered.wait(LIMIT_S)
+        for size in (2**20, 2**21, 3):
+            publisher.put([bytes(size)], None)
+            with inbox.changed:
+                assert inbox.changed.wait_for(lambda size=size: size in inbox.items, LIMIT_S)
+    assert len(inbox.items) == 3
 
 
 def test_a_thread_of_zenoh_keeps_its_state_from_one_callback_to_the_next(router: str) -> None:
