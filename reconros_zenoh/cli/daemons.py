@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import signal
+from contextlib import suppress
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
@@ -54,9 +55,13 @@ def router(
     endings = {signal.SIGINT, signal.SIGTERM}
     # `sigwait` only takes signals that are blocked, in Zenoh's threads too.
     signal.pthread_sigmask(signal.SIG_BLOCK, endings)
-    with ZenohRouter.open(listen):
+    # A thread that was there before the mask may take a signal that comes just before or after the wait.
+    with ZenohRouter.open(listen), suppress(KeyboardInterrupt):
         print(f"router listens on {listen}", flush=True)
-        signal.sigwait(endings)
+        number = signal.sigwait(endings)
+        # Handled as everywhere, so that a second one, as `timeout` sends, is ignored while the router ends.
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, endings)
+        signal.raise_signal(number)
 
 
 def board(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+from operator import attrgetter
 from pathlib import Path
 from typing import Annotated
 
@@ -31,7 +32,7 @@ def hist(
         typer.Option(
             metavar="OTHER",
             help="Show another distribution beside each: that of a file, or of the record with the same "
-            "mapping/client in a folder.",
+            "mapping/client in a folder; with the same client, if the mappings have nothing in common.",
             show_default=False,
         ),
     ] = None,
@@ -79,11 +80,15 @@ def _pair(entries: list[NamedRecord], compare: Path) -> list[tuple[NamedRecord, 
     others = _load([compare])
     if not compare.is_dir():
         return [(entry, others[0]) for entry in entries]
-    by_name = {other.name: other for other in others}
-    pairs = [(entry, by_name.get(entry.name)) for entry in entries]
-    if not any(other for _, other in pairs):
-        raise UsageError(
-            f"{compare}: none of its records ({others[0].name}, ...) is called like one of those given "
-            f"({entries[0].name}, ...). Give a folder with the same mapping/client names, or a file."
-        )
-    return pairs
+    names = [attrgetter("name")]
+    if len({other.path.parent for other in others}) == 1:  # else a client has several records there
+        names.append(attrgetter("path.stem"))
+    for name in names:
+        by_name = {name(other): other for other in others}
+        pairs = [(entry, by_name.get(name(entry))) for entry in entries]
+        if any(other for _, other in pairs):
+            return pairs
+    raise UsageError(
+        f"{compare}: none of its records ({others[0].name}, ...) is called like one of those given "
+        f"({entries[0].name}, ...). Give a folder with the same mapping/client names, or a file."
+    )

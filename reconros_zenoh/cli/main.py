@@ -66,6 +66,10 @@ def main() -> None:
         # Whoever read our output has had enough; Python must not complain at exit either.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(1)
+    finally:
+        # Python gives its handlers back before it ends: a second signal would kill it and change the status.
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, signal.SIG_IGN)
 
 
 def _application(verbs: list[str]) -> typer.Typer:

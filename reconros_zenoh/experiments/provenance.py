@@ -36,8 +36,8 @@ def provenance() -> dict[str, Any]:
     }
 
 
-def host(overruns: int) -> dict[str, Any]:
-    """Return what is known of this host, and how often it was slower than the model."""
+def host(overruns: int | None) -> dict[str, Any]:
+    """Return what is known of this host, and how often it was slower than the model (None: not known)."""
     return {"machine": machine(), "overruns": overruns}
 
 

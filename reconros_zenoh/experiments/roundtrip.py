@@ -72,10 +72,10 @@ class BoardReport:
     statuses: dict[str, Mapping[str, Any]] = field(default_factory=dict)
 
     def host(self) -> dict[str, Any]:
-        """Return the overruns of all mappings together and the worst lag."""
+        """Return the overruns of all mappings together and the worst lag, None where no board told them."""
         hosts = [status["host"] for status in self.statuses.values()]
         return {
-            **host(sum(each["overruns"] for each in hosts)),
+            **host(sum(each["overruns"] for each in hosts) if hosts else None),
             **{
                 key: max((each[key] for each in hosts if each[key] is not None), default=None)
                 for key in ("lag_p50_us", "lag_p99_us")

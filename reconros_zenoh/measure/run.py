@@ -37,7 +37,7 @@ class _Cell(_Part):
 
 
 class _Host(_Part):
-    overruns: int
+    overruns: int | None
     lag_p50_us: float | None
     lag_p99_us: float | None
 

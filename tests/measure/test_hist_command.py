@@ -73,6 +73,19 @@ def test_folders_are_compared_by_mapping_and_client(folder, write_run, board_rec
     assert "all_software/sort" in output.replace("\n", " ").split(f"not in {other}")[-1]
 
 
+def test_two_mappings_are_compared_by_client(folder):
+    data = json.loads(run(folder / "mixed", "--compare", folder / "all_software", "--json"))
+    compared = {record["name"]: record["compare"]["name"] for record in data["records"]}
+    assert len(compared) == 5
+    assert compared["mixed/sobel"] == "all_software/sobel"
+
+
+def test_a_mapping_is_not_compared_with_one_of_several(folder, write_run, board_records):
+    other = write_run({"mine": board_records["mixed"], "yours": board_records["mixed"]}, "wall")
+    with pytest.raises(UsageError, match="none of its records"):
+        run(folder / "mixed", "--compare", other)
+
+
 def test_the_histograms_are_drawn(folder, tmp_path):
     run(folder / "mixed", "--png", tmp_path / "h.png")
     assert (tmp_path / "h.png").read_bytes().startswith(b"\x89PNG")

@@ -182,6 +182,7 @@ def _commands(children: list[psutil.Process]) -> list[str]:
 def _interrupted(folder: Path, clock: str) -> dict[str, Any]:
     experiment: dict[str, Any] = json.loads((folder / clock / "experiment.json").read_text(encoding="utf-8"))
     assert experiment["interrupted"] is True
+    assert experiment["host"]["overruns"] is None  # no board was asked
     cells: dict[str, Any] = experiment["mappings"]["all_hardware"]
     return cells
 

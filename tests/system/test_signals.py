@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 from signal import SIGINT, SIGKILL, SIGTERM, Signals
 from threading import Condition
@@ -89,6 +90,19 @@ def test_router_and_board_end_without_complaint(endpoint: str, number: Signals) 
         assert router.end(number) == 0
         assert len(board.out) == len(router.out) == 1
         assert board.err == router.err == []
+
+
+@both_signals
+def test_a_second_signal_changes_nothing(endpoint: str, number: Signals) -> None:
+    with (
+        Process("router", "--listen", endpoint) as router,
+        Process("board", "--router", endpoint) as board,
+    ):
+        board.wait_for("board board0 serves roundtrip")
+        for process in (board, router):
+            os.kill(process.pid, number)
+            assert process.end(number) == 0
+            assert process.err == []
 
 
 def test_board_and_client_go_on_without_a_router_and_find_the_next(
