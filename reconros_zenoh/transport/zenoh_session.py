@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 
 # One pool instead of a thread per stage nearly halves a round trip; of two threads, closing can have to wait.
 # A socket is watched by the pool that accepted it: were `acc` elsewhere, a message would wake a thread more.
-# What sends has a thread of its own: a callback that publishes a large message waits for it, and would wait in
-# vain for one of its own pool; what does not fit into the queue is dropped.
+# Only what sends is apart: a callback that publishes a large message without shared memory waits for it, in
+# the same pool in vain, and then the message is dropped.
 _THREADS = "(rx: (handover: net), tx: (worker_threads: 1), acc: (handover: net), net: (worker_threads: 4))"
 
 # From here on [byte] Zenoh hands messages over by shared memory. A round trip of 16 KiB took 0.20 ms with it
