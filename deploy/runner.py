@@ -22,6 +22,10 @@ if TYPE_CHECKING:
 
     from deploy.compose import Deployment
 
+# A signal need not end a wait: one that comes just as it begins, or that the kernel gives to another thread,
+# is served when it ends.
+_LONGEST_WAIT_S = 1.0
+
 
 class LocalRunner:
     """A context in which the services of a deployment run, each in its own session and with its own log file.
@@ -173,9 +177,9 @@ class LocalRunner:
     def _wait(self) -> None:
         """Wait for one event or for the next thing that is due, and deal with it."""
         times = [run.next_ns for run in self._runs.values() if run.next_ns is not None]
-        timeout_s = max(0, min(times) - time.monotonic_ns()) / 10**9 if times else None
+        due_s = max(0, min(times) - time.monotonic_ns()) / 10**9 if times else _LONGEST_WAIT_S
         with suppress(Empty):
-            self._events.get(timeout=timeout_s)()
+            self._events.get(timeout=min(due_s, _LONGEST_WAIT_S))()
         for run in self._runs.values():
             run.act(time.monotonic_ns())
 
