@@ -75,23 +75,16 @@ class VirtualNetwork:
             self.environment.step()  # fails when nothing is left to happen
 
 
-class ZenohNetwork:
+class RoutedNetwork:
+    """Sessions that hear of each other through the router only, as on several hosts."""
+
     def __init__(self, endpoint: str, stack: ExitStack) -> None:
         self._endpoint = endpoint
         self._stack = stack
         self._changed = Condition()
-        self._sessions: list[ZenohTransport] = []
 
-    def session(self) -> Transport:
-        """Return a session linked to all others: before, Zenoh also sends what nobody subscribed to."""
-        links = self.inbox()
-        session = self._stack.enter_context(ZenohTransport.open(self._endpoint, timeout_s=LIMIT_S))
-        listener = session.session.info.declare_transport_events_listener(links.put, history=True)
-        others = {other.session_id for other in self._sessions}
-        self.wait(lambda: {str(event.transport.zid) for event in links.items} >= others)
-        listener.undeclare()
-        self._sessions.append(session)
-        return session
+    def session(self) -> ZenohTransport:
+        return self._stack.enter_context(ZenohTransport.open(self._endpoint, timeout_s=LIMIT_S))
 
     def inbox(self) -> Inbox:
         return Inbox(self._changed)
@@ -99,6 +92,25 @@ class ZenohNetwork:
     def wait(self, condition: Callable[[], bool]) -> None:
         with self._changed:
             assert self._changed.wait_for(condition, LIMIT_S)
+
+
+class ZenohNetwork(RoutedNetwork):
+    """Sessions of one host, which are linked to each other."""
+
+    def __init__(self, endpoint: str, stack: ExitStack) -> None:
+        super().__init__(endpoint, stack)
+        self._sessions: list[ZenohTransport] = []
+
+    def session(self) -> ZenohTransport:
+        """Return a session linked to all others: before, Zenoh also sends what nobody subscribed to."""
+        links = self.inbox()
+        session = super().session()
+        listener = session.session.info.declare_transport_events_listener(links.put, history=True)
+        others = {other.session_id for other in self._sessions}
+        self.wait(lambda: {str(event.transport.zid) for event in links.items} >= others)
+        listener.undeclare()
+        self._sessions.append(session)
+        return session
 
 
 def free_endpoint() -> str:
@@ -113,13 +125,22 @@ def router() -> Iterator[str]:
         yield endpoint
 
 
-@pytest.fixture(params=["simulated", "zenoh"])
+def as_another_host_does(router: str) -> str:
+    """Return an endpoint of a router on the loopback that does not look like one."""
+    return router.replace("127.0.0.1", "0.0.0.0")
+
+
+@pytest.fixture(params=["simulated", "zenoh", "zenoh between hosts"])
 def network(request: pytest.FixtureRequest) -> Iterator[Network]:
     if request.param == "simulated":
         yield VirtualNetwork()
         return
+    router = request.getfixturevalue("router")
     with ExitStack() as stack:
-        yield ZenohNetwork(request.getfixturevalue("router"), stack)
+        if request.param == "zenoh":
+            yield ZenohNetwork(router, stack)
+        else:
+            yield RoutedNetwork(as_another_host_does(router), stack)
 
 
 def know(network: Network, session: Transport, *others: Transport) -> None:
@@ -707,12 +728,31 @@ def test_what_is_no_endpoint_is_refused(endpoint: str) -> None:
         ZenohRouter.open(endpoint)
 
 
-def test_sessions_find_a_router_that_comes_back() -> None:
+@pytest.mark.parametrize(
+    ("endpoint", "expected"),
+    [
+        ("tcp/127.0.0.1:7447", True),
+        ("tcp/127.1.2.3:7447", True),
+        ("tcp/localhost:7447", True),
+        ("tcp/[::1]:7447", True),
+        ("unixsock-stream//tmp/router.sock", True),
+        ("tcp/10.0.0.7:7447", False),
+        ("udp/10.0.0.7:7447?rel=0#iface=eth0", False),
+        ("tcp/[fe80::1%eth0]:7447", False),
+        ("tcp/router:7447", False),
+    ],
+)
+def test_an_endpoint_tells_whether_it_is_of_this_host(endpoint: str, expected: bool) -> None:
+    assert zenoh_session.is_of_this_host(endpoint) is expected
+
+
+@pytest.mark.parametrize("seen_from", [str, as_another_host_does])
+def test_sessions_find_a_router_that_comes_back(seen_from: Callable[[str], str]) -> None:
     endpoint = free_endpoint()
     changed = Condition()
     tokens = Inbox(changed)
     first = ZenohRouter.open(endpoint)
-    with ZenohTransport.open(endpoint) as here:
+    with ZenohTransport.open(seen_from(endpoint)) as here:
         here.declare_token("lv/1")
         first.close()
         with ZenohRouter.open(endpoint), ZenohTransport.open(endpoint) as there:
