@@ -193,10 +193,8 @@ class ZenohTransport(Closing):
         # Publishers last: without subscriptions Zenoh no longer waits for the interpreter (`watch_matching`).
         for declaration in sorted(self.declarations.copy(), key=lambda each: isinstance(each, _Publisher)):
             declaration.close()
-        try:
+        with suppress(zenoh.ZError):  # it gives up taking leave of a router whose host has vanished
             self.session.close()  # type: ignore[no-untyped-call] # so is the stub
-        except zenoh.ZError as error:
-            raise _failure("the session cannot be closed", error) from error
 
 
 class _Declaration(GuardedDeclaration):

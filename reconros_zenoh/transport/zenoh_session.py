@@ -31,6 +31,13 @@ _THREADS = "(rx: (handover: net), tx: (worker_threads: 1), acc: (handover: net),
 # and 0.18 without, 32 KiB 0.20 both, 64 KiB 0.23 and 0.28; Zenoh's own default is 3 KiB.
 _SHARED_FROM = 32 * 1024
 
+# How long [us] a message, and all fragments of a large one, wait for room on a link before they are dropped.
+# In Zenoh's own 1 and 50 ms no image gets to a host behind 100 Mbit/s. What must not be dropped waits 5 s,
+# Zenoh's default, and then the link is closed.
+_WAIT_US = 50_000
+_WAIT_LARGE_US = 5_000_000
+_DROP = "transport/link/tx/queue/congestion_control/drop"
+
 _ADDRESS = re.compile(r"\w+/(?P<host>.+):\d+([?#].*)?")
 
 _COLLECT = GarbageCollect()
@@ -56,6 +63,8 @@ def configuration(mode: str, endpoints: dict[str, str]) -> zenoh.Config:
     config.insert_json5("transport/shared_memory/enabled", json.dumps(shared))
     optimization = "transport/shared_memory/transport_optimization"
     config.insert_json5(f"{optimization}/message_size_threshold", json.dumps(_SHARED_FROM))
+    config.insert_json5(f"{_DROP}/wait_before_drop", json.dumps(_WAIT_US))
+    config.insert_json5(f"{_DROP}/max_wait_before_drop_fragments", json.dumps(_WAIT_LARGE_US))
     return config
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import socket
-from contextlib import ExitStack
+from contextlib import ExitStack, contextmanager, suppress
 from itertools import count
 from threading import Condition, Event, Thread, get_ident, local
 from typing import TYPE_CHECKING, Any, Protocol
@@ -128,6 +128,40 @@ def router() -> Iterator[str]:
 def as_another_host_does(router: str) -> str:
     """Return an endpoint of a router on the loopback that does not look like one."""
     return router.replace("127.0.0.1", "0.0.0.0")
+
+
+@contextmanager
+def halting_link(router: str) -> Iterator[str]:
+    """Give an endpoint from which a session reaches the router, with a halt of 0.3 s behind the first MB.
+
+    So a link halts that has lost a packet.
+    """
+
+    def pass_on(source: socket.socket, sink: socket.socket) -> None:
+        passed = 0
+        with suppress(OSError):
+            while part := source.recv(65_536):
+                if passed < 1_000_000 <= passed + len(part):
+                    Event().wait(0.3)
+                passed += len(part)
+                sink.sendall(part)
+
+    def serve() -> None:
+        near, _ = server.accept()
+        host, port = router.removeprefix("tcp/").split(":")
+        with near, socket.create_connection((host, int(port))) as far:
+            back = Thread(target=pass_on, args=(far, near), daemon=True)
+            back.start()
+            pass_on(near, far)
+            far.shutdown(socket.SHUT_RDWR)
+            back.join(LIMIT_S)
+
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        server.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 65_536)  # else it takes the message meanwhile
+        thread = Thread(target=serve, daemon=True)
+        thread.start()
+        yield as_another_host_does(f"tcp/127.0.0.1:{server.getsockname()[1]}")
+        thread.join(LIMIT_S)
 
 
 @pytest.fixture(params=["simulated", "zenoh", "zenoh between hosts"])
@@ -673,6 +707,24 @@ def test_a_callback_may_publish_what_no_shared_memory_takes(
     assert len(inbox.items) == 3
 
 
+def test_a_large_message_waits_for_a_link_that_halts(router: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(zenoh_session, "_SHARED_FROM", 2**30)  # shared memory needs no link
+    monkeypatch.setattr(frames, "_SMALLEST_FRAME_BYTES", 2**30)
+    inbox = Inbox(Condition())
+    message = np.random.default_rng(0).bytes(16_000_000)  # more than the sender's socket takes meanwhile
+    with halting_link(router) as far, ExitStack() as sessions:
+        here = sessions.enter_context(ZenohTransport.open(router))
+        there = sessions.enter_context(ZenohTransport.open(far))
+        matched = Event()
+        here.subscribe(KEY, inbox.put, DEFAULT)
+        publisher = there.publish(KEY, DEFAULT, lambda matching: matched.set() if matching else None)
+        assert matched.wait(LIMIT_S)
+        publisher.put([message], None)
+        with inbox.changed:
+            assert inbox.changed.wait_for(lambda: len(inbox.items) == 1, LIMIT_S)
+    assert inbox.items[0].payload == message
+
+
 def test_a_thread_of_zenoh_keeps_its_state_from_one_callback_to_the_next(router: str) -> None:
     of_thread = local()
     inbox = Inbox(Condition())
@@ -693,6 +745,17 @@ def test_a_thread_of_zenoh_keeps_its_state_from_one_callback_to_the_next(router:
     known = [kept for place, (ident, kept) in enumerate(inbox.items) if ident in dict(inbox.items[:place])]
     assert known
     assert all(known)
+
+
+def test_a_session_that_cannot_take_leave_is_closed_all_the_same() -> None:
+    class Left:
+        def zid(self) -> str:
+            return "1"
+
+        def close(self) -> None:
+            raise zenoh_session.zenoh.ZError("close operation timed out!")
+
+    ZenohTransport(Left()).close()  # type: ignore[arg-type] # a session whose router's host has vanished
 
 
 def test_no_router_is_said_in_one_sentence(capfd: pytest.CaptureFixture[str]) -> None:
