@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections import Counter
 from contextlib import closing
 from queue import SimpleQueue
@@ -21,6 +22,8 @@ if TYPE_CHECKING:
     from reconros_zenoh.board.executor import Executor
     from reconros_zenoh.transport.base import Declaration, Reply, Request, Transport
 
+_log = logging.getLogger(__name__)
+
 VERSION = 1
 _HOST_ANEW = b"host anew"
 _ANSWER_NS = 2_000_000_000
@@ -36,7 +39,8 @@ def claim_name(transport: Transport, board: str) -> None:
 
     Of several that ask at the same time one gets it. Each claims the name first and then looks: who sees an
     owner, or a claim of a lower session id, gives way; the others have not looked yet when this one becomes
-    the owner, or see its claim.
+    the owner, or see its claim. Boards that could not see each other may have one name: when they can, each
+    logs it.
     """
     claims, owners = f"reconros/{board}/claims/", f"reconros/{board}/owner/"
     mine = claims + transport.session_id
@@ -46,7 +50,14 @@ def claim_name(transport: Transport, board: str) -> None:
         raise UsageError(
             f"a board named {board!r} is running already. Stop it, or start this one with --name."
         )
-    transport.declare_token(owners + transport.session_id)
+    own = owners + transport.session_id
+
+    def on_change(owner: str, is_alive: bool) -> None:
+        if is_alive and owner != own:
+            _log.warning("another board is named %r, and both answer clients: stop one", board)
+
+    transport.watch_tokens(f"{owners}*", on_change)
+    transport.declare_token(own)
 
 
 class ControlServer:

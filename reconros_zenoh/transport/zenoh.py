@@ -23,7 +23,7 @@ from reconros_zenoh.transport.changes import MatchingChanges, TokenChanges, gath
 from reconros_zenoh.transport.frames import Frames
 from reconros_zenoh.transport.guard import Closing, GuardedDeclaration
 from reconros_zenoh.transport.key_expressions import check_concrete
-from reconros_zenoh.transport.zenoh_session import configuration, direct, open_pool
+from reconros_zenoh.transport.zenoh_session import configuration, direct, is_of_this_host, open_pool
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -77,9 +77,16 @@ class ZenohTransport(Closing):
     def open(cls, router: str, *, timeout_s: float = 3.0) -> Self:
         """Return a session that is connected to `router`, for which it waits at most `timeout_s`.
 
+        With a router on the loopback it is a peer, as in rmw_zenoh. With any other it is a client,
+        which listens nowhere: the router passes everything on.
         Raises TransportError when no router answers, UsageError when `router` is not an endpoint.
         """
-        config = configuration("peer", {"connect/endpoints": router, "listen/endpoints": "tcp/127.0.0.1:0"})
+        if is_of_this_host(router):
+            config = configuration(
+                "peer", {"connect/endpoints": router, "listen/endpoints": "tcp/127.0.0.1:0"}
+            )
+        else:  # a router lets peers speak to each other directly, which those of two loopbacks cannot
+            config = configuration("client", {"connect/endpoints": router})
         config.insert_json5("connect/timeout_ms", json.dumps(max(1, round(timeout_s * 1000))))
         config.insert_json5("connect/exit_on_failure", "true")
         config.insert_json5("connect/retry", "{period_init_ms: 100, period_max_ms: 1000}")
@@ -186,10 +193,8 @@ class ZenohTransport(Closing):
         # Publishers last: without subscriptions Zenoh no longer waits for the interpreter (`watch_matching`).
         for declaration in sorted(self.declarations.copy(), key=lambda each: isinstance(each, _Publisher)):
             declaration.close()
-        try:
+        with suppress(zenoh.ZError):  # it gives up taking leave of a router whose host has vanished
             self.session.close()  # type: ignore[no-untyped-call] # so is the stub
-        except zenoh.ZError as error:
-            raise _failure("the session cannot be closed", error) from error
 
 
 class _Declaration(GuardedDeclaration):

@@ -197,6 +197,18 @@ def test_of_two_that_claim_a_name_at_once_one_gets_it(sessions: str, monkeypatch
     assert sorted(got) == [False, True]
 
 
+def test_a_board_tells_of_another_that_had_its_name_out_of_sight(caplog: pytest.LogCaptureFixture) -> None:
+    environment = VirtualEnvironment()
+    network = SimulatedNetwork(environment)
+    claim_name(network.transport("a"), "board0")
+    claim_name(network.transport("b"), "board1")
+    environment.run()
+    assert caplog.messages == []
+    network.transport("c").declare_token("reconros/board0/owner/c")
+    environment.run()
+    assert caplog.messages == ["another board is named 'board0', and both answer clients: stop one"]
+
+
 def test_the_token_of_a_board() -> None:
     assert alive_key("left_arm") == "reconros/left_arm/alive"
 

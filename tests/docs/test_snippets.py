@@ -56,7 +56,7 @@ def run_in_terminals(text: str, place: str) -> None:
         running = []
         for command, shown in transcript(text):
             verb, *arguments = shlex.split(command, comments=True)[1:]
-            if verb in {"router", "run"}:
+            if verb in {"router", "run", "board"}:
                 there, ready = ("--listen", "listens") if verb == "router" else ("--router", "serves")
                 process = terminals.enter_context(Process(verb, *arguments, there, endpoint))
                 process.wait_for(ready)
