@@ -68,15 +68,15 @@ def roundtrip(
     """
     planned = plan(clock, mapping or MAPPINGS, requests, seed, out, profile)
     experiment = run(planned, quiet=as_json)
-    if as_json:
-        print(json.dumps(experiment))
-    else:
+    if not as_json:
         show(wide_console(), experiment)
         print(f"records and experiment.json are in {planned.folder}")
     if experiment["mappings"]:
         write_grid(planned.drawing, load_run(planned.folder)[1])
         if not as_json:
             print(f"drawn to {planned.drawing}")
+    if as_json:
+        print(json.dumps(experiment))
     if experiment["interrupted"]:
         raise interrupted(quiet=as_json, measured=bool(experiment["mappings"]))
     raise typer.Exit(0 if all_right(experiment) else 1)

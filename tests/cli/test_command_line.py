@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
+from typing import TYPE_CHECKING
 
 import pytest
 from typer.testing import CliRunner
 
 from reconros_zenoh.cli.main import _VERBS, _application
 from reconros_zenoh.errors import UsageError
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 application = _application(list(_VERBS))
 
@@ -72,3 +77,37 @@ def test_a_gateway_needs_a_type() -> None:
     done = CliRunner().invoke(application, ["gateway", "--hmt", "/a"])
     assert isinstance(done.exception, UsageError)
     assert "Add for example --type sensor_msgs/Image" in str(done.exception)
+
+
+def reconros(words: str, redirected: str = "") -> subprocess.CompletedProcess[str]:
+    """Run a command in a shell that redirects its streams."""
+    line = f"exec '{sys.executable}' -m reconros_zenoh {words} {redirected}"
+    return subprocess.run(line, shell=True, capture_output=True, timeout=120, check=False, text=True)
+
+
+def test_an_error_is_an_object_where_json_is_asked_for() -> None:
+    done = reconros("check nowhere --json")
+    (line,) = done.stderr.splitlines()
+    assert (done.returncode, line) == (2, f"reconros: {json.loads(done.stdout)['error']}")
+    assert "nowhere: cannot be read" in line
+
+
+@pytest.mark.parametrize("words", ["--help", "hist {record}", "hist {record} --json", "check nowhere --json"])
+def test_a_full_disk_is_told_in_a_line(words: str, tmp_path: Path) -> None:
+    record = tmp_path / "times.csv"
+    record.write_text("1.0\n2.0\n", encoding="utf-8")
+    done = reconros(words.format(record=record), ">/dev/full")
+    last = done.stderr.splitlines()[-1]
+    assert (done.returncode, last) == (
+        1,
+        "reconros: the output cannot be written: No space left on device",
+    )
+    assert "Traceback" not in done.stderr
+
+
+def test_closed_streams_do_not_matter(tmp_path: Path) -> None:
+    record = tmp_path / "times.csv"
+    record.write_text("1.0\n2.0\n", encoding="utf-8")
+    done = reconros(f"hist {record} --png {tmp_path / 'times.png'}", "<&- >&- 2>&-")
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+    assert (tmp_path / "times.png").read_bytes().startswith(b"\x89PNG")
