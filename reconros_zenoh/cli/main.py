@@ -10,6 +10,7 @@ import os
 import signal
 import sys
 import time
+from io import TextIOWrapper
 from pathlib import Path
 
 import typer
@@ -50,6 +51,8 @@ def main() -> None:
     ended by Ctrl-C or SIGTERM before its end. With --json an error is `{"error": ...}` on stdout, too.
     """
     _open_closed_streams()
+    if isinstance(sys.stdout, TextIOWrapper) and sys.stdout.errors == "strict":
+        sys.stdout.reconfigure(errors="backslashreplace")  # a path may have what the terminal has not
     logging.basicConfig(level=logging.INFO, format="%(levelname)s %(name)s: %(message)s")
     logging.getLogger("matplotlib").setLevel(logging.ERROR)  # where its fonts are is nobody's concern
     ending = _Ending()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 from typing import TYPE_CHECKING
@@ -111,3 +112,28 @@ def test_closed_streams_do_not_matter(tmp_path: Path) -> None:
     done = reconros(f"hist {record} --png {tmp_path / 'times.png'}", "<&- >&- 2>&-")
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
     assert (tmp_path / "times.png").read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize(
+    ("encoding", "name", "shown"),
+    [("latin-1", "\u2192".encode(), b"\\u2192"), ("utf-8", b"\xff", b"\\udcff")],
+    ids=["an arrow in latin-1", "what is no UTF-8"],
+)
+def test_a_path_that_stdout_has_no_letters_for(
+    encoding: str, name: bytes, shown: bytes, tmp_path: Path
+) -> None:
+    (tmp_path / "times.csv").write_text("1.0\n2.0\n", encoding="utf-8")
+    drawing = os.fsdecode(name + b".png")
+    command = [sys.executable, "-m", "reconros_zenoh", "hist", "times.csv", "--png", drawing]
+    environment = {
+        **os.environ,
+        "PYTHONPATH": os.pathsep.join(sys.path),
+        "PYTHONUTF8": "1",
+        "PYTHONIOENCODING": encoding,
+    }
+    done = subprocess.run(
+        command, cwd=tmp_path, env=environment, capture_output=True, timeout=120, check=False
+    )
+    assert (done.returncode, done.stderr) == (0, b"")
+    assert done.stdout.endswith(b"drawn to " + shown + b".png\n")
+    assert {path.name for path in tmp_path.iterdir()} == {"times.csv", drawing}
