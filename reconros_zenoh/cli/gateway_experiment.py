@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 
     from reconros_zenoh.experiments.roundtrip import Clock
 
+_LARGEST_BYTES = 1_000_000_000
+"""Every subscriber has a copy of its own."""
 _RESULT = "gateway.json"
 _FIGURES = {"hardware": "fig6_hardware_publisher.png", "software": "fig7_software_publisher.png"}
 
@@ -156,11 +158,13 @@ def _sizes(text: str) -> list[int]:
     for word in text.split(","):
         unit = next((unit for unit in units if word.strip().endswith(unit)), "")
         number = word.strip().removesuffix(unit)
-        if not (unit and number.isascii() and number.isdigit() and int(number)):
+        size = int(number) * units[unit] if unit and number.isascii() and number.isdigit() else 0
+        if not 1 <= size <= _LARGEST_BYTES:
             raise UsageError(
-                f"{word!r} is no message size. Write whole numbers of B, kB or MB, as in --sizes 10kB,1MB."
+                f"{word!r} is no message size. Write whole numbers of B, kB or MB up to 1000MB, as in "
+                "--sizes 10kB,1MB."
             )
-        sizes.append(int(number) * units[unit])
+        sizes.append(size)
     return sizes
 
 

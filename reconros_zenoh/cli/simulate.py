@@ -33,6 +33,7 @@ def simulate(
         int | None,
         typer.Option(
             min=1,
+            max=10_000,
             metavar="N",
             help="Run N clones of the file's boards and clients, each on a network of its own.",
             show_default="those of the file",
