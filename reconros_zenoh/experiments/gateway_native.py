@@ -23,6 +23,7 @@ from reconros_zenoh.experiments.interruption import until_interrupted
 from reconros_zenoh.experiments.provenance import host
 from reconros_zenoh.experiments.wall import free_port
 from reconros_zenoh.transport.zenoh import ZenohRouter
+from reconros_zenoh.transport.zenoh_session import has_shared_memory
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -30,17 +31,24 @@ if TYPE_CHECKING:
 
     from reconros_zenoh.experiments.gateway_processes import Receipt
 
-COPIES = [
+_COPIES = [
     (
-        "SMT: the publisher copies each message once, into shared memory; each subscription copies it out: "
-        "one per hardware node, all in the board's process, and one in the software subscriber's."
+        "SMT: the publisher copies each message once; each subscription copies it out: one per hardware "
+        "node, all in the board's process, and one in the software subscriber's."
     ),
     (
         "gateway: the publisher copies it once; the board copies it out once, and each hardware node gets a "
         "read-only view of that copy; the software subscriber copies it out."
     ),
-    "Below 256 KiB Zenoh itself makes the copy into shared memory; below 32 KiB it goes through sockets.",
 ]
+_IN_SHARED_MEMORY = (
+    "The publisher's copy is in shared memory: below 256 KiB Zenoh makes it, below 32 KiB the message goes "
+    "through sockets."
+)
+_THROUGH_SOCKETS = (
+    "Messages go through sockets, which copy them several times more for each receiving process: shared "
+    "memory is not used, because there is none or too little of it may be locked (see `ulimit -l`)."
+)
 
 K = TypeVar("K")
 _LIMIT_S = 20.0
@@ -51,6 +59,11 @@ _MOST_LOST = 0.1
 
 Role: TypeAlias = "tuple[Callable[..., None], tuple[object, ...]]"
 """What a process runs, and its arguments after its connection."""
+
+
+def copies() -> list[str]:
+    """Return what is copied where, in sentences."""
+    return [*_COPIES, _IN_SHARED_MEMORY if has_shared_memory() else _THROUGH_SOCKETS]
 
 
 def measure_native(
@@ -78,7 +91,7 @@ def measure_native(
         "statistic": "median",
         "cells": [cell.as_json() for cell in cells],
         "anchors": [],
-        "copies": COPIES,
+        "copies": copies(),
         "host": host(0),
         "interrupted": interruption.happened,
     }

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import ctypes
 import gc
+import mmap
 from functools import cache
 
 # <malloc.h> of glibc
 _M_TRIM_THRESHOLD = -1
 _M_TOP_PAD = -2
 _M_MMAP_THRESHOLD = -3
+
+# <sys/mman.h> of Linux
+_MLOCK_ONFAULT = 1
 
 _MIB = 1024 * 1024
 _OBJECTS_BETWEEN_COLLECTIONS = 50_000
@@ -41,3 +45,17 @@ def _tune_malloc() -> None:
     mallopt(_M_MMAP_THRESHOLD, 32 * _MIB)
     mallopt(_M_TRIM_THRESHOLD, 1024 * _MIB)
     mallopt(_M_TOP_PAD, 64 * _MIB)
+
+
+def can_lock(size: int) -> bool:
+    """Whether this process may lock `size` bytes of memory, as far as Linux tells; nothing stays locked."""
+    try:
+        mlock2 = ctypes.CDLL(None).mlock2
+        memory = mmap.mmap(-1, size, flags=mmap.MAP_PRIVATE)
+    except (AttributeError, OSError):  # a C library without mlock2; less address space than that
+        return False
+    with memory:
+        first = ctypes.c_char.from_buffer(memory)
+        locked = bool(mlock2(ctypes.byref(first), ctypes.c_size_t(size), _MLOCK_ONFAULT) == 0)
+        del first  # else the memory cannot be closed
+    return locked

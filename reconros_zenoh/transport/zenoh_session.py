@@ -8,6 +8,7 @@ import os
 import sys
 import threading
 from contextlib import suppress
+from functools import cache
 from typing import TYPE_CHECKING, TypeVar
 
 import zenoh
@@ -15,6 +16,7 @@ from zenoh.handlers import Callback
 from zenoh.shm import GarbageCollect, ShmProvider, ZShmMut
 
 from reconros_zenoh.errors import UsageError
+from reconros_zenoh.transport.memory import can_lock
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -28,6 +30,9 @@ _THREADS = "(rx: (handover: net), tx: (worker_threads: 1), acc: (handover: net),
 # From here on [byte] Zenoh hands messages over by shared memory. A round trip of 16 KiB took 0.20 ms with it
 # and 0.18 without, 32 KiB 0.20 both, 64 KiB 0.23 and 0.28; Zenoh's own default is 3 KiB.
 _SHARED_FROM = 32 * 1024
+
+# What a process may have to map: its own pools, and those of several peers.
+_LOCKED_BYTES = 1 << 30
 
 _COLLECT = GarbageCollect()
 
@@ -47,12 +52,23 @@ def configuration(mode: str, endpoints: dict[str, str]) -> zenoh.Config:
             raise UsageError(f"{endpoint!r} is not a Zenoh endpoint such as tcp/127.0.0.1:7447") from error
     config.insert_json5("scouting/multicast/enabled", "false")
     config.insert_json5("timestamping/enabled", "true")  # the caches of transient local publishers need it
-    # With shared memory switched on and none to be had, a session does not open.
-    shared = sys.platform != "linux" or os.access("/dev/shm", os.W_OK)  # noqa: S108 # only looked at
-    config.insert_json5("transport/shared_memory/enabled", json.dumps(shared))
+    config.insert_json5("transport/shared_memory/enabled", json.dumps(has_shared_memory()))
     optimization = "transport/shared_memory/transport_optimization"
     config.insert_json5(f"{optimization}/message_size_threshold", json.dumps(_SHARED_FROM))
     return config
+
+
+@cache
+def has_shared_memory() -> bool:
+    """Whether this process uses shared memory; peers that do send it everything through sockets otherwise.
+
+    With shared memory switched on and none to be had, a session does not open. Zenoh locks every segment in
+    memory, also those of its peers, and a message whose segment cannot be locked is lost without a word
+    (Zenoh issue 2788). Linux lets ordinary users lock 8 MiB.
+    """
+    if sys.platform != "linux":
+        return True
+    return os.access("/dev/shm", os.W_OK) and can_lock(_LOCKED_BYTES)  # noqa: S108 # only looked at
 
 
 def direct(callback: Callable[[_T], None], drop: Callable[[], None] | None = None) -> Callback[_T]:
@@ -74,6 +90,8 @@ def direct(callback: Callable[[_T], None], drop: Callable[[], None] | None = Non
 
 def open_pool(pool_bytes: int) -> Callable[[int], ZShmMut | None] | None:
     """Return what takes frames out of a new pool, as `Frames` wants it; None without shared memory."""
+    if not has_shared_memory():
+        return None
     try:
         pool = ShmProvider.default_backend(pool_bytes)
     except zenoh.ZError:

@@ -21,7 +21,7 @@ from table import arguments, free_port, print_result
 
 from reconros_zenoh.applications.gateway.nodes import random_body
 from reconros_zenoh.experiments.gateway import COUNTS, SIZES
-from reconros_zenoh.experiments.gateway_native import COPIES, Setup, native_setup, take_turns
+from reconros_zenoh.experiments.gateway_native import Setup, copies, native_setup, take_turns
 from reconros_zenoh.experiments.gateway_processes import Receiver, begin_process, commands
 from reconros_zenoh.transport.zenoh import ZenohRouter
 
@@ -115,7 +115,7 @@ def main() -> None:
         ]
     print_result("gateway", rows, as_json=chosen.json)
     if not chosen.json:
-        print("\n".join(COPIES))
+        print("\n".join(copies()))
 
 
 if __name__ == "__main__":

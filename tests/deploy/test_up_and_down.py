@@ -307,7 +307,8 @@ def test_files_of_one_name_have_states_of_their_own(tmp_path: Path) -> None:
     assert len(paths) == 2
 
 
-def test_the_terminal_shows_states_below_the_lines(tmp_path: Path) -> None:
+def test_the_terminal_shows_states_below_the_lines(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("TERM", "xterm")  # whatever this test runs in
     text = io.StringIO()
     console = Console(file=text, force_terminal=True, width=60, soft_wrap=True, color_system=None)
     (tmp_path / "board.log").write_text("\x1b[1mready\x1b[0m\nto serve")

@@ -21,7 +21,7 @@ application = _application(list(_VERBS))
     ],
 )
 def test_a_narrow_terminal_gets_what_one_of_80_columns_gets(command: str) -> None:
-    words = command.replace("PROJECT", str(application_folder())).split()
+    words = [str(application_folder()) if word == "PROJECT" else word for word in command.split()]
     narrow, usual = (
         CliRunner().invoke(application, words, env={"COLUMNS": columns}) for columns in ("40", "80")
     )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 from pathlib import Path
+from shlex import quote
 from shutil import copytree
 from typing import TYPE_CHECKING
 
@@ -231,7 +232,8 @@ def test_a_client_whom_nobody_answers_is_named(tmp_path: Path) -> None:
 
 
 def test_a_board_that_cannot_host_its_project_is_named(tmp_path: Path) -> None:
-    file = write_deployment(tmp_path, f"{BOARD} {ECHO} --mapping=software", "reconros client sort")
+    board = f"{BOARD} {quote(str(ECHO))} --mapping=software"
+    file = write_deployment(tmp_path, board, "reconros client sort")
     with pytest.raises(
         UsageError, match=r"s0: .*/main\.py:20: profile 'miniitx-zynq7100' has no times for callback 'number'"
     ):
