@@ -89,8 +89,7 @@ class DdsStack:
         large = size > self._large_from
         known_ns = min(max(0, transit_ns), self._link_ns(size))
         self._transit_ns[large] += (known_ns - self._transit_ns[large]) / _TRANSITS_REMEMBERED
-        left_ns = min(timeline.started_ns, self._environment.now)
-        yield from self._until(left_ns + self._link_ns(size))
+        yield from self._until(timeline.started_ns + self._link_ns(size))
         timeline.mark("transport")
         probability = self._loss_probability_busy if self._cpu.is_busy else self._loss_probability
         yield from self._process(size, self._receive_ns_per_byte)

@@ -30,15 +30,16 @@ Stage = Literal[
 class Timeline:
     """The stages of one message, without gap: their times sum to its end-to-end time.
 
-    `callback` is the callback that serves the message, empty until a worker took it.
+    `callback` is the callback that serves the message, empty until a worker took it. A message that came
+    from a clock that is ahead, or that was set back since, starts now.
     """
 
     __slots__ = ("_environment", "_since_ns", "callback", "stages_ns", "started_ns")
 
     def __init__(self, environment: VirtualEnvironment, started_ns: int) -> None:
         self._environment = environment
-        self.started_ns = started_ns
-        self._since_ns = started_ns
+        self.started_ns = min(started_ns, environment.now)
+        self._since_ns = self.started_ns
         self.callback = ""
         self.stages_ns: defaultdict[Stage, int] = defaultdict(int)
 

@@ -16,7 +16,7 @@ from rich.text import Text
 from reconros_zenoh.cli.options import AsJson
 from reconros_zenoh.project.build_cfg import read_build_cfg
 from reconros_zenoh.project.communication import check_topics
-from reconros_zenoh.project.interfaces import read_interfaces
+from reconros_zenoh.project.loader import read_project
 from reconros_zenoh.project.resources import slot_resources
 
 if TYPE_CHECKING:
@@ -46,13 +46,17 @@ def check(
 ) -> None:
     """Show what a ReconROS project file says.
 
-    What a folder holds in msg/ is read too. Exit status 2 when the project cannot be used.
+    What a folder holds in msg/ and mappings/ is read too. Exit status 2 when the project cannot be used.
     """
-    path = project / "build.cfg" if project.is_dir() else project
-    configuration = read_build_cfg(path)
-    check_topics(configuration)
     if project.is_dir():
-        read_interfaces(project).registry()
+        files = read_project(project)
+        files.types()
+        for name in files.mapping_files():
+            files.mapping(name)
+        configuration = files.configuration
+    else:
+        configuration = read_build_cfg(project)
+        check_topics(configuration)
     if as_json:
         print(json.dumps(_as_json(configuration)))
         return

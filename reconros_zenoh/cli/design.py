@@ -66,6 +66,7 @@ def design(
     )
     from reconros_zenoh.experiments.design_pictures import pictures_of
     from reconros_zenoh.experiments.interruption import until_interrupted
+    from reconros_zenoh.experiments.provenance import own_folder
     from reconros_zenoh.measure.design_report import write_design_report
 
     modelled = read_profile(profile).model is not None
@@ -76,28 +77,29 @@ def design(
     if clock is ClockName.VIRTUAL and view:
         raise UsageError("--view shows pictures as they come, which needs --clock wall.")
     plan = DesignPlan(clock.value, seconds, seed, profile, out)
-    prepare(plan)
-    endings: dict[str, Ending] = {}
-    with (
-        run_bar("design example", len(VARIANTS), quiet=as_json) as advance,
-        until_interrupted() as interruption,
-    ):
-        if clock is ClockName.VIRTUAL:
-            from reconros_zenoh.experiments.design_virtual import run_design_virtual
+    with own_folder(plan.folder):
+        prepare(plan)
+        endings: dict[str, Ending] = {}
+        with (
+            run_bar("design example", len(VARIANTS), quiet=as_json) as advance,
+            until_interrupted() as interruption,
+        ):
+            if clock is ClockName.VIRTUAL:
+                from reconros_zenoh.experiments.design_virtual import run_design_virtual
 
-            run_design_virtual(plan, endings, advance)
-        else:
-            from reconros_zenoh.experiments.design_wall import run_design_wall
-            from reconros_zenoh.experiments.wall import free_port
+                run_design_virtual(plan, endings, advance)
+            else:
+                from reconros_zenoh.experiments.design_wall import run_design_wall
+                from reconros_zenoh.experiments.wall import free_port
 
-            port = free_port() if view else None
-            if view:
-                Console(stderr=True).print(f"the pictures are at http://127.0.0.1:{port}/")
-            run_design_wall(plan, endings, advance, port)
-    experiment = finish(plan, endings, interrupted=interruption.happened)
-    variants = experiment["variants"]
-    if variants:
-        write_design_report(plan.folder / REPORT, experiment, pictures_of(plan, variants))
+                port = free_port() if view else None
+                if view:
+                    Console(stderr=True).print(f"the pictures are at http://127.0.0.1:{port}/")
+                run_design_wall(plan, endings, advance, port)
+        experiment = finish(plan, endings, interrupted=interruption.happened)
+        variants = experiment["variants"]
+        if variants:
+            write_design_report(plan.folder / REPORT, experiment, pictures_of(plan, variants))
     if as_json:
         print(json.dumps(experiment))
     elif variants:

@@ -17,6 +17,7 @@ from reconros_zenoh.cli.progress import ExperimentProgress
 from reconros_zenoh.cli.tables import callbacks, reconfiguration
 from reconros_zenoh.errors import UsageError
 from reconros_zenoh.experiments.interruption import until_interrupted
+from reconros_zenoh.experiments.provenance import own_folder
 from reconros_zenoh.experiments.roundtrip import (
     BoardReport,
     Plan,
@@ -68,15 +69,15 @@ def roundtrip(
     """
     planned = plan(clock, mapping or MAPPINGS, requests, seed, out, profile)
     experiment = run(planned, quiet=as_json)
-    if as_json:
-        print(json.dumps(experiment))
-    else:
+    if not as_json:
         show(wide_console(), experiment)
         print(f"records and experiment.json are in {planned.folder}")
     if experiment["mappings"]:
         write_grid(planned.drawing, load_run(planned.folder)[1])
         if not as_json:
             print(f"drawn to {planned.drawing}")
+    if as_json:
+        print(json.dumps(experiment))
     if experiment["interrupted"]:
         raise interrupted(quiet=as_json, measured=bool(experiment["mappings"]))
     raise typer.Exit(0 if all_right(experiment) else 1)
@@ -114,14 +115,15 @@ def show(console: Console, experiment: dict[str, Any]) -> None:
 def run(plan: Plan, *, quiet: bool) -> dict[str, Any]:
     """Run the experiment and return its object; Ctrl-C keeps what was measured and marks it interrupted."""
     report = BoardReport()
-    prepare(plan)
-    with ExperimentProgress(plan, quiet=quiet) as progress, until_interrupted() as interruption:
-        if plan.clock == "virtual":
-            from reconros_zenoh.experiments.virtual import run_virtual
+    with own_folder(plan.folder):
+        prepare(plan)
+        with ExperimentProgress(plan, quiet=quiet) as progress, until_interrupted() as interruption:
+            if plan.clock == "virtual":
+                from reconros_zenoh.experiments.virtual import run_virtual
 
-            run_virtual(plan, report, progress.advance)
-        else:
-            from reconros_zenoh.experiments.wall import run_wall
+                run_virtual(plan, report, progress.advance)
+            else:
+                from reconros_zenoh.experiments.wall import run_wall
 
-            run_wall(plan, report, progress.advance)
-    return finish(plan, report, interrupted=interruption.happened)
+                run_wall(plan, report, progress.advance)
+        return finish(plan, report, interrupted=interruption.happened)

@@ -16,7 +16,7 @@ from reconros_zenoh.cli.console import interrupted, wide_console
 from reconros_zenoh.cli.options import AsJson, ClockName, Out, Profile
 from reconros_zenoh.cli.progress import run_bar
 from reconros_zenoh.errors import UsageError
-from reconros_zenoh.experiments.provenance import writing
+from reconros_zenoh.experiments.provenance import own_folder, writing
 from reconros_zenoh.measure.findings import host_troubles
 
 if TYPE_CHECKING:
@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 
     from reconros_zenoh.experiments.roundtrip import Clock
 
+_LARGEST_BYTES = 1_000_000_000
+"""Every subscriber has a copy of its own."""
 _RESULT = "gateway.json"
 _FIGURES = {"hardware": "fig6_hardware_publisher.png", "software": "fig7_software_publisher.png"}
 
@@ -69,13 +71,14 @@ def gateway(
         if clock is ClockName.VIRTUAL or publisher is PublisherName.HARDWARE:
             raise UsageError("profile native runs in real time, with the publisher in software.")
         publishers = ["software"]
-    _prepare(out)
-    with run_bar("cells", len(publishers) * len(byte_counts) * len(counts), quiet=as_json) as advance:
-        if board.model is None:
-            result = measure_native(byte_counts, counts, repeat, advance)
-        else:
-            result = measure_gateway(time, board, publishers, byte_counts, counts, repeat, advance)
-    paths = _write(out, result)
+    with own_folder(out):
+        _prepare(out)
+        with run_bar("cells", len(publishers) * len(byte_counts) * len(counts), quiet=as_json) as advance:
+            if board.model is None:
+                result = measure_native(byte_counts, counts, repeat, advance)
+            else:
+                result = measure_gateway(time, board, publishers, byte_counts, counts, repeat, advance)
+        paths = _write(out, result)
     if as_json:
         print(json.dumps(result))
     else:
@@ -86,9 +89,8 @@ def gateway(
 
 
 def _prepare(out: Path) -> None:
-    """Make the folder before anything is measured, without what an earlier run left."""
+    """Remove what an earlier run left, before anything is measured."""
     with writing(out):
-        out.mkdir(parents=True, exist_ok=True)
         for name in (_RESULT, *_FIGURES.values()):
             (out / name).unlink(missing_ok=True)
         (out / _RESULT).touch()  # who cannot write shall hear of it before he measures
@@ -156,11 +158,13 @@ def _sizes(text: str) -> list[int]:
     for word in text.split(","):
         unit = next((unit for unit in units if word.strip().endswith(unit)), "")
         number = word.strip().removesuffix(unit)
-        if not (unit and number.isascii() and number.isdigit() and int(number)):
+        size = int(number) * units[unit] if unit and number.isascii() and number.isdigit() else 0
+        if not 1 <= size <= _LARGEST_BYTES:
             raise UsageError(
-                f"{word!r} is no message size. Write whole numbers of B, kB or MB, as in --sizes 10kB,1MB."
+                f"{word!r} is no message size. Write whole numbers of B, kB or MB up to 1000MB, as in "
+                "--sizes 10kB,1MB."
             )
-        sizes.append(int(number) * units[unit])
+        sizes.append(size)
     return sizes
 
 

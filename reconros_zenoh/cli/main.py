@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import importlib
+import json
 import logging
 import math
 import os
 import signal
 import sys
 import time
+from io import TextIOWrapper
+from pathlib import Path
 
 import typer
 
@@ -44,9 +47,12 @@ def main() -> None:
     """Run the command of this process's arguments and exit.
 
     Status 0: it did what was asked (router and board: until a signal came); 1: an experiment failed, or an
-    answer was wrong or lost; 2: what was given cannot be used; 130: ended by Ctrl-C or SIGTERM before its
-    end.
+    answer was wrong or lost, or the output could not be written; 2: what was given cannot be used; 130:
+    ended by Ctrl-C or SIGTERM before its end. With --json an error is `{"error": ...}` on stdout, too.
     """
+    _open_closed_streams()
+    if isinstance(sys.stdout, TextIOWrapper) and sys.stdout.errors == "strict":
+        sys.stdout.reconfigure(errors="backslashreplace")  # a path may have what the terminal has not
     logging.basicConfig(level=logging.INFO, format="%(levelname)s %(name)s: %(message)s")
     logging.getLogger("matplotlib").setLevel(logging.ERROR)  # where its fonts are is nobody's concern
     ending = _Ending()
@@ -55,16 +61,23 @@ def main() -> None:
     # A verb imports what it needs itself: the others' imports would double its start.
     given = sys.argv[1] if len(sys.argv) > 1 else ""
     try:
-        _application([given] if given in _VERBS else list(_VERBS))(prog_name="reconros")
+        try:
+            _application([given] if given in _VERBS else list(_VERBS))(prog_name="reconros")
+        except (UsageError, TransportError) as error:
+            _fail(error, 2)
+        except ReconrosError as error:
+            _fail(error, 1)
+        finally:
+            sys.stdout.flush()
     except KeyboardInterrupt:
         sys.exit(130)
-    except (UsageError, TransportError) as error:
-        _fail(error, 2)
-    except ReconrosError as error:
-        _fail(error, 1)
-    except BrokenPipeError:
-        # Whoever read our output has had enough; Python must not complain at exit either.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    except BrokenPipeError:  # whoever read our output has had enough
+        _drop_output()
+        sys.exit(1)
+    except OSError as error:  # a full disk, for example
+        _drop_output()
+        place = error.filename or "the output cannot be written"
+        print(f"reconros: {place}: {error.strerror}", file=sys.stderr)
         sys.exit(1)
     finally:
         # Python gives its handlers back before it ends: a second signal would kill it and change the status.
@@ -94,7 +107,21 @@ def _application(verbs: list[str]) -> typer.Typer:
 
 def _fail(error: ReconrosError, status: int) -> None:
     print(f"reconros: {error}", file=sys.stderr)
+    if "--json" in sys.argv:
+        print(json.dumps({"error": str(error)}), flush=True)
     sys.exit(status)
+
+
+def _drop_output() -> None:
+    """Let what is still to be written to stdout go nowhere: Python would complain at its exit."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def _open_closed_streams() -> None:
+    """Let what nobody reads or writes be /dev/null: a file that is opened later would get its number."""
+    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+        if getattr(sys, name) is None:
+            setattr(sys, name, Path(os.devnull).open(mode, encoding="utf-8"))  # noqa: SIM115 # until the end
 
 
 class _Ending:

@@ -15,7 +15,7 @@ from rich.text import Text
 
 from reconros_zenoh.board.profile import read_profile
 from reconros_zenoh.cli.console import wide_console
-from reconros_zenoh.cli.options import ENDPOINT, AsJson, Domain, Router, project_prints
+from reconros_zenoh.cli.options import ENDPOINT, AsJson, Domain, Router
 from reconros_zenoh.errors import UsageError
 from reconros_zenoh.mapping.communication import Crossings, map_topics
 from reconros_zenoh.mapping.graph_file import read_graph_file
@@ -88,8 +88,7 @@ def map_communication(
     """
     if hardware and not live:
         raise UsageError("--hardware names nodes of --live; projects and graph files say it themselves.")
-    with project_prints(as_json=as_json):
-        read = _read_live(router, domain, hardware or [], source) if live else _read(source, mapping)
+    read = _read_live(router, domain, hardware or [], source) if live else _read(source, mapping)
     if read.configuration is None and (mapping is not None or apply):
         raise UsageError(f"{'--apply' if apply else '--mapping'} needs the folder of a project.")
     graph = read.graph
@@ -127,12 +126,12 @@ def _read(source: Path | None, mapping: str | None) -> _Source:
     if not source.is_dir():
         raise UsageError(f"{source} is no folder. Give that of a ReconROS project, or a graph file (*.yaml).")
     from reconros_zenoh.mapping.project_graph import read_project_graph
-    from reconros_zenoh.project.build_cfg import read_build_cfg
-    from reconros_zenoh.project.loader import load_project
+    from reconros_zenoh.project.loader import read_project
 
-    configuration = read_build_cfg(source / "build.cfg")
-    node_mapping = load_project(source).mapping(mapping) if mapping else None
-    return _Source(read_project_graph(configuration, node_mapping), configuration, node_mapping)
+    project = read_project(source)
+    node_mapping = project.mapping(mapping) if mapping else None
+    graph = read_project_graph(project.configuration, node_mapping)
+    return _Source(graph, project.configuration, node_mapping)
 
 
 def _read_live(router: str, domain: int, hardware: list[str], source: Path | None) -> _Source:

@@ -16,8 +16,9 @@ from reconros_zenoh.cli.console import interrupted, wide_console
 from reconros_zenoh.cli.options import AsJson, project_prints
 from reconros_zenoh.cli.progress import run_bar
 from reconros_zenoh.cli.service_commands import read_deployment
-from reconros_zenoh.experiments.deployment import DeploymentRun, prepare
+from reconros_zenoh.experiments.deployment import DeploymentRun
 from reconros_zenoh.experiments.interruption import until_interrupted
+from reconros_zenoh.experiments.provenance import own_folder
 from reconros_zenoh.measure.statistics import format_ms
 
 if TYPE_CHECKING:
@@ -32,6 +33,7 @@ def simulate(
         int | None,
         typer.Option(
             min=1,
+            max=10_000,
             metavar="N",
             help="Run N clones of the file's boards and clients, each on a network of its own.",
             show_default="those of the file",
@@ -56,15 +58,14 @@ def simulate(
     nothing was lost. Ctrl-C keeps what was measured.
     """
     plan = read_deployment(file, os.environ).changed(requests, seed)
-    prepare(out)
-    with project_prints(as_json=as_json):
+    with own_folder(out), project_prints(as_json=as_json):
         run = DeploymentRun([plan] if boards is None else [plan.clone(number) for number in range(boards)])
         with (
             run_bar("virtual time", run.requests, quiet=as_json, each="requests") as advance,
             until_interrupted() as interruption,
         ):
             run.run(advance)
-    run.write_records(out)
+        run.write_records(out)
     summaries = run.summaries()
     simulated_s = run.simulated_ns / 1e9
     if as_json:

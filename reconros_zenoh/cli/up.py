@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import sys
 from pathlib import Path  # typer reads the annotations at run time
 from typing import TYPE_CHECKING, Annotated
 
@@ -53,6 +54,9 @@ def up(
         failure, error = caught, str(caught)
     if as_json:
         _print_json(file, folder, screen.states, error)
+        if isinstance(failure, ExperimentError):
+            print(f"reconros: {error}", file=sys.stderr)
+            failure = typer.Exit(1)  # raised, it would be a second object
     if failure is not None:
         raise failure
     if detach:

@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from reconros_zenoh.errors import UsageError
-from reconros_zenoh.experiments.provenance import writing
 from reconros_zenoh.experiments.simulation import Simulation
 from reconros_zenoh.measure.record import Record, RecordWriter
 from reconros_zenoh.measure.statistics import summarise
@@ -159,12 +158,6 @@ class DeploymentRun:
             board: {service: _summary(service, trips) for service, trips in services.items()}
             for board, services in self.round_trips.items()
         }
-
-
-def prepare(folder: Path) -> None:
-    """Make the folder of the records; raise UsageError when that fails."""
-    with writing(folder):
-        folder.mkdir(parents=True, exist_ok=True)
 
 
 def _summary(service: str, trips: Sequence[RoundTrip]) -> dict[str, Any]:

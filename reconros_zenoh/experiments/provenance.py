@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fcntl
 import json
 import os
 import platform
@@ -48,6 +49,30 @@ def writing(place: Path) -> Iterator[None]:
         yield
     except OSError as error:
         raise UsageError(f"{place} cannot be written ({error.strerror}). Choose another --out.") from None
+
+
+@contextmanager
+def own_folder(folder: Path) -> Iterator[None]:
+    """Run the block with a folder that no other experiment writes to at the same time.
+
+    Makes the folder; raises UsageError when that fails, or while another experiment has it.
+    """
+    with writing(folder):
+        folder.mkdir(parents=True, exist_ok=True)
+        descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        os.close(descriptor)
+        raise UsageError(
+            f"another experiment is writing to {folder}. Wait for its end, or choose another --out."
+        ) from None
+    except OSError:
+        pass  # some network file systems lock no folders
+    try:
+        yield
+    finally:
+        os.close(descriptor)
 
 
 def write_experiment(folder: Path, experiment: Mapping[str, Any]) -> None:

@@ -9,14 +9,16 @@ from typing import TYPE_CHECKING
 from reconros_zenoh.errors import FileError, UsageError
 from reconros_zenoh.gateway.filters import Pair, conflict
 from reconros_zenoh.ros.names import resolve
+from reconros_zenoh.ros.zero_message import zero_message
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
     from pathlib import Path
 
     from reconros_zenoh.project.build_cfg import BuildConfiguration, RosGateway
     from reconros_zenoh.project.mapping_file import CallbackMapping
     from reconros_zenoh.project.resource_groups import Resource
+    from reconros_zenoh.ros.types import TypeRegistry
 
 _ENDS = {"rossub": "subscriber", "rospub": "publisher"}
 
@@ -62,6 +64,30 @@ def check_topics(configuration: BuildConfiguration) -> None:
                     f"{_ENDS[end.type]} but no gateway to it.",
                     f"Declare a `[ROSGateway@name]` with `HWTopic = {topic}` and `SWTopic = {topic}`.",
                 )
+
+
+def check_fifos(configuration: BuildConfiguration, types: Callable[[], TypeRegistry]) -> None:
+    """Raise FileError at the line of the first end that no message of its type fits, or of an unknown type.
+
+    `types` is called if there is an end that declares the bytes of its messages.
+    """
+    for end in configuration.resources:
+        if end.fifo.message_bytes is None:
+            continue
+        assert end.interface is not None
+        try:
+            message_type = types().message(end.interface)
+        except UsageError as error:
+            raise FileError(configuration.path, end.line, f"{end.name}: {error}") from error
+        smallest = sum(map(len, message_type.encode(zero_message(message_type))))
+        if end.fifo.message_bytes < smallest:
+            raise FileError(
+                configuration.path,
+                end.line,
+                f"message_bytes of {end.name} is {end.fifo.message_bytes}, but no message of the type "
+                f"{end.interface} has fewer than {smallest} bytes.",
+                "Raise its message_bytes.",
+            )
 
 
 def check_places(configuration: BuildConfiguration, callbacks: Mapping[str, CallbackMapping]) -> None:

@@ -11,7 +11,7 @@ from reconros_zenoh.board.bitstream import Bitstream
 from reconros_zenoh.board.board import SlotPlan
 from reconros_zenoh.errors import FileError, UsageError
 from reconros_zenoh.project.build_cfg import read_build_cfg
-from reconros_zenoh.project.communication import check_places, check_topics
+from reconros_zenoh.project.communication import check_fifos, check_places, check_topics
 from reconros_zenoh.project.interfaces import read_interfaces
 from reconros_zenoh.project.main_file import load_main, running_project
 from reconros_zenoh.project.mapping_file import Mapping, built_for, read_mapping
@@ -30,13 +30,12 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Project:
-    """A project folder as read; `main` is the function of that name in its main.py."""
+class ProjectFiles:
+    """A project folder as read, but for its Python."""
 
     folder: Path
     configuration: BuildConfiguration
     interfaces: Interfaces
-    main: Callable[[Application], None]
 
     @property
     def callbacks(self) -> tuple[str, ...]:
@@ -64,6 +63,67 @@ class Project:
     def pointer_bytes(self) -> int:
         """The size of a pointer on the board's processor."""
         return 8 if "64" in self.configuration.cpu_architecture else 4
+
+    def types(self) -> TypeRegistry:
+        """Return the registry that knows the project's interfaces, the same one each time."""
+        return self._types
+
+    @cached_property
+    def _types(self) -> TypeRegistry:
+        return self.interfaces.registry()
+
+    def mapping(self, name_or_file: str | None) -> Mapping:
+        """Return the mapping of that name in the project's folder `mappings`, or the one in that file.
+
+        None stands for the first in the folder, or, if there is none, for the default.
+        """
+        name_or_file = name_or_file or next(iter(self.mapping_files()), None)
+        if name_or_file is None:
+            mapping = Mapping.default(self.configuration)
+        else:
+            mapping = read_mapping(
+                self.mapping_path(name_or_file),
+                built_for(self.configuration),
+                [slot.slot_id for slot in self.slots],
+            )
+        check_places(self.configuration, mapping.callbacks)
+        return mapping
+
+    def mapping_path(self, name_or_file: str) -> Path:
+        """Return where the mapping stands; raise UsageError when there is none of that name."""
+        shipped = self.mapping_files()
+        if name_or_file in shipped:
+            return shipped[name_or_file]
+        path = Path(name_or_file)
+        if path.suffix != ".toml":
+            known = f"one of {', '.join(shipped)} or " if shipped else ""
+            raise UsageError(f"no mapping named {name_or_file!r}. Give {known}a .toml file.")
+        return path
+
+    def mapping_files(self) -> dict[str, Path]:
+        """Return the mapping files in the project's folder `mappings` by name, in the order of the names."""
+        return {path.stem: path for path in sorted((self.folder / "mappings").glob("*.toml"))}
+
+    def bitstreams(self, profile: Profile) -> list[Bitstream]:
+        """Return the bitstream of each callback for each reconfigurable slot that it is built for."""
+        sizes = {
+            slot.slot_id: profile.bitstream_size(slot.lut, slot.dsp, slot.bram36)
+            for slot in self.slots
+            if slot.reconfigurable
+        }
+        return [
+            Bitstream(slot, callback, sizes[slot])
+            for callback, slots in built_for(self.configuration).items()
+            for slot in slots
+            if slot in sizes
+        ]
+
+
+@dataclass(frozen=True)
+class Project(ProjectFiles):
+    """A project folder as read; `main` is the function of that name in its main.py."""
+
+    main: Callable[[Application], None]
 
     def start(self, application: Application) -> Executor:
         """Call main(app) and return the executor that it spins.
@@ -97,68 +157,23 @@ class Project:
                 )
         return executor
 
-    def types(self) -> TypeRegistry:
-        """Return the registry that knows the project's interfaces, the same one each time."""
-        return self._types
 
-    @cached_property
-    def _types(self) -> TypeRegistry:
-        return self.interfaces.registry()
-
-    def mapping(self, name_or_file: str | None) -> Mapping:
-        """Return the mapping of that name in the project's folder `mappings`, or the one in that file.
-
-        None stands for the first in the folder, or, if there is none, for the default.
-        """
-        name_or_file = name_or_file or next(iter(self._mappings()), None)
-        if name_or_file is None:
-            mapping = Mapping.default(self.configuration)
-        else:
-            mapping = read_mapping(
-                self.mapping_path(name_or_file),
-                built_for(self.configuration),
-                [slot.slot_id for slot in self.slots],
-            )
-        check_places(self.configuration, mapping.callbacks)
-        return mapping
-
-    def mapping_path(self, name_or_file: str) -> Path:
-        """Return where the mapping stands; raise UsageError when there is none of that name."""
-        shipped = self._mappings()
-        if name_or_file in shipped:
-            return shipped[name_or_file]
-        path = Path(name_or_file)
-        if path.suffix != ".toml":
-            known = f"one of {', '.join(shipped)} or " if shipped else ""
-            raise UsageError(f"no mapping named {name_or_file!r}. Give {known}a .toml file.")
-        return path
-
-    def _mappings(self) -> dict[str, Path]:
-        return {path.stem: path for path in sorted((self.folder / "mappings").glob("*.toml"))}
-
-    def bitstreams(self, profile: Profile) -> list[Bitstream]:
-        """Return the bitstream of each callback for each reconfigurable slot that it is built for."""
-        sizes = {
-            slot.slot_id: profile.bitstream_size(slot.lut, slot.dsp, slot.bram36)
-            for slot in self.slots
-            if slot.reconfigurable
-        }
-        return [
-            Bitstream(slot, callback, sizes[slot])
-            for callback, slots in built_for(self.configuration).items()
-            for slot in slots
-            if slot in sizes
-        ]
-
-
-def load_project(folder: Path) -> Project:
-    """Return the project in a folder; raise FileError for what is missing or wrong in it."""
+def read_project(folder: Path) -> ProjectFiles:
+    """Return the files of the project in a folder; raise FileError for what is missing or wrong in them."""
     if folder.is_file():
         raise FileError(folder, None, "is a file.", "Give the folder of a project, where its build.cfg is.")
     configuration = read_build_cfg(folder / "build.cfg")
     check_topics(configuration)
-    interfaces = read_interfaces(folder)
-    return Project(folder, configuration, interfaces, load_main(folder, configuration.name))
+    files = ProjectFiles(folder, configuration, read_interfaces(folder))
+    check_fifos(configuration, files.types)
+    return files
+
+
+def load_project(folder: Path) -> Project:
+    """Return the project in a folder; raise FileError for what is missing or wrong in it."""
+    files = read_project(folder)
+    main = load_main(folder, files.configuration.name)
+    return Project(folder, files.configuration, files.interfaces, main)
 
 
 def _line_that_names(path: Path, name: str) -> int | None:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from reconros_zenoh.project.build_cfg import BuildConfiguration
 
-_Count = Annotated[StrictInt, Field(ge=0)]
+_Count = Annotated[StrictInt, Field(ge=0, le=1000)]
 
 
 class CallbackMapping(BaseModel):

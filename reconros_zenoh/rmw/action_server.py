@@ -99,6 +99,7 @@ class ActionServer:
         self._accept = accept
         self._lock = threading.RLock()
         self._goals: OrderedDict[bytes, GoalHandle] = OrderedDict()
+        self._entries: dict[bytes, Any] = {}  # of each goal in the status message
         self._results: dict[bytes, Any] = {}
         self._waiting: dict[bytes, list[Responder]] = {}
         hidden = f"{name}/_action"
@@ -157,6 +158,7 @@ class ActionServer:
             )
             if response.accepted:
                 self._goals[goal_id] = handle
+                self._entries[goal_id] = self._entry(handle)
         responder.respond_encoded(self._type.send_goal.response.encode(response))
         if response.accepted:
             self._publish_status()
@@ -206,17 +208,20 @@ class ActionServer:
     def _publish_status(self) -> None:
         message = zero_message(self._type.status)
         with self._lock:
-            for handle in self._goals.values():
-                entry = zero_message(self._type.status.nested("action_msgs/msg/GoalStatus"))
-                entry.goal_info = _goal_info(self._type.status, handle)
-                entry.status = int(handle.status)
+            for goal_id, entry in self._entries.items():
+                entry.status = int(self._goals[goal_id].status)
                 message.status_list.append(entry)
             self._status.publish(message)
+
+    def _entry(self, handle: GoalHandle) -> Any:
+        entry = zero_message(self._type.status.nested("action_msgs/msg/GoalStatus"))
+        entry.goal_info = _goal_info(self._type.status, handle)
+        return entry
 
     def _forget_old(self) -> None:
         ended = [goal_id for goal_id in self._goals if goal_id in self._results]
         for goal_id in ended[: max(0, len(ended) - _ENDED_KEPT)]:
-            del self._goals[goal_id], self._results[goal_id]
+            del self._goals[goal_id], self._entries[goal_id], self._results[goal_id]
 
 
 def _is_meant(handle: GoalHandle, goal_id: bytes, stamp_ns: int) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from abc import ABC, abstractmethod
 from typing import TYPE_CHECKING
 
 from reconros_zenoh.ros.attachment import Attachment
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
     from reconros_zenoh.ros.types import MessageType, ServiceType
 
 
-class Endpoint:
+class Endpoint(ABC):
     """One end of a topic or service, announced in the ROS graph until it is closed."""
 
     def __init__(
@@ -24,6 +25,7 @@ class Endpoint:
     ) -> None:
         context = node.context
         self.context = context
+        self._node = node
         self.name = resolve(name, node.namespace, node.name)
         self.key = data_key(context.domain, self.name, interface.dds_name, interface.type_hash)
         self._token_key = EndpointToken(
@@ -43,12 +45,18 @@ class Endpoint:
         self._sequence_numbers = itertools.count(1)
 
     def announce(self) -> None:
-        """Make the endpoint visible in the graph, once it works."""
+        """Make the endpoint visible in the graph, once it works; from then on its node closes it, too."""
         self._token = self.context.transport.declare_token(self._token_key)
+        self._node.endpoints[self] = None
 
     def withdraw(self) -> None:
-        """Take the endpoint out of the graph."""
+        """Take the endpoint out of the graph, and from its node."""
+        self._node.endpoints.pop(self, None)
         self._token.close()
+
+    @abstractmethod
+    def close(self) -> None:
+        """End it for good; idempotent."""
 
     def next_sequence_number(self) -> int:
         """Return the number of the endpoint's next message; callable from any thread."""

@@ -18,6 +18,7 @@ from reconros_zenoh.ros.qos import QosProfile
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from reconros_zenoh.rmw.endpoint import Endpoint
     from reconros_zenoh.rmw.received import Received
     from reconros_zenoh.ros.types import MessageType, ServiceType
     from reconros_zenoh.transport.base import Transport
@@ -51,7 +52,7 @@ class Context:
 
 
 class Node:
-    """A ROS 2 node; its endpoints live until it is closed."""
+    """A ROS 2 node; its `endpoints` live until they or the node are closed."""
 
     def __init__(self, context: Context, name: str, namespace: str) -> None:
         check_node_name(name)
@@ -60,7 +61,7 @@ class Node:
         self.name = name
         self.namespace = namespace
         self.node_id = context.next_id()
-        self._endpoints: list[Publisher | Subscription | Service | Client] = []
+        self.endpoints: dict[Endpoint, None] = {}
         self._token = context.transport.declare_token(
             NodeToken(
                 context.domain, context.transport.session_id, self.node_id, self.node_id, namespace, name
@@ -80,9 +81,7 @@ class Node:
         on_matching: Callable[[bool], None] | None = None,
     ) -> Publisher:
         """Return a new publisher; `on_matching` as in `Transport.publish`."""
-        endpoint = Publisher(self, message_type, topic, qos or QosProfile(), on_matching)
-        self._endpoints.append(endpoint)
-        return endpoint
+        return Publisher(self, message_type, topic, qos or QosProfile(), on_matching)
 
     def subscription(
         self,
@@ -93,9 +92,7 @@ class Node:
         check: Callable[[Any], None] | None = None,
     ) -> Subscription:
         """Return a new subscription; see there for `sink` and `check`."""
-        endpoint = Subscription(self, message_type, topic, qos or QosProfile(), sink, check)
-        self._endpoints.append(endpoint)
-        return endpoint
+        return Subscription(self, message_type, topic, qos or QosProfile(), sink, check)
 
     def service(
         self,
@@ -105,20 +102,16 @@ class Node:
         check: Callable[[Any], None] | None = None,
     ) -> Service:
         """Return a new service server; see there for `sink` and `check`."""
-        endpoint = Service(self, service_type, name, _SERVICES, sink, check)
-        self._endpoints.append(endpoint)
-        return endpoint
+        return Service(self, service_type, name, _SERVICES, sink, check)
 
     def client(
         self, service_type: ServiceType, name: str, on_matching: Callable[[bool], None] | None = None
     ) -> Client:
         """Return a new service client; `on_matching` as in `Transport.request`."""
-        endpoint = Client(self, service_type, name, _SERVICES, on_matching)
-        self._endpoints.append(endpoint)
-        return endpoint
+        return Client(self, service_type, name, _SERVICES, on_matching)
 
     def close(self) -> None:
         """Close every endpoint and take the node out of the graph. Idempotent."""
-        for endpoint in self._endpoints:
+        for endpoint in list(self.endpoints):
             endpoint.close()
         self._token.close()

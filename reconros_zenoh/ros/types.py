@@ -117,7 +117,7 @@ class MessageType:
         """
         if len(payload) < _ENCAPSULATION_LENGTH:
             raise BadMessageError(
-                "truncated", f"{self.name}: {len(payload)} bytes hold no encapsulation header"
+                "truncated", f"{self.name}: no encapsulation header of 4 bytes in a payload of {len(payload)}"
             )
         encapsulation = payload[0] << 8 | payload[1]
         if encapsulation != _LITTLE_ENDIAN:
@@ -137,7 +137,9 @@ class MessageType:
             raise BadMessageError("truncated", f"{self.name}, {len(payload)} bytes: {error}") from error
         # Some DDS implementations fill the last word of a payload.
         if len(body) > end + -end % 4:
-            raise BadMessageError("truncated", f"{self.name}: {len(body) - end} bytes follow the message")
+            raise BadMessageError(
+                "truncated", f"{self.name}: the message ends after {end} of {len(body)} bytes"
+            )
         return message
 
     def _serialize(self, message: Any) -> bytes:

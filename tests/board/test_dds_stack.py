@@ -210,9 +210,10 @@ def test_a_message_that_took_longer_than_the_modelled_link_is_not_delayed() -> N
 
 def test_a_sender_whose_clock_is_ahead_does_not_lengthen_the_link() -> None:
     stack = Stack()
-    _, end = stack.begin("message", "in", 8, transit_ns=-400)
+    timeline, end = stack.begin("message", "in", 8, transit_ns=-400)
     stack.environment.run(until=end)
     assert stack.log == [(516 + 124, "message")]
+    assert (stages(timeline), timeline.total_ns) == ({"transport": 516, "dds": 124}, 516 + 124)
 
 
 def test_what_the_board_sends_leaves_earlier_by_what_messages_lately_took_in_the_real_network() -> None:

@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+import json
+import os
 import subprocess
 import sys
+from typing import TYPE_CHECKING
 
 import pytest
 from typer.testing import CliRunner
 
 from reconros_zenoh.cli.main import _VERBS, _application
 from reconros_zenoh.errors import UsageError
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 application = _application(list(_VERBS))
 
@@ -72,3 +78,62 @@ def test_a_gateway_needs_a_type() -> None:
     done = CliRunner().invoke(application, ["gateway", "--hmt", "/a"])
     assert isinstance(done.exception, UsageError)
     assert "Add for example --type sensor_msgs/Image" in str(done.exception)
+
+
+def reconros(words: str, redirected: str = "") -> subprocess.CompletedProcess[str]:
+    """Run a command in a shell that redirects its streams."""
+    line = f"exec '{sys.executable}' -m reconros_zenoh {words} {redirected}"
+    return subprocess.run(line, shell=True, capture_output=True, timeout=120, check=False, text=True)
+
+
+def test_an_error_is_an_object_where_json_is_asked_for() -> None:
+    done = reconros("check nowhere --json")
+    (line,) = done.stderr.splitlines()
+    assert (done.returncode, line) == (2, f"reconros: {json.loads(done.stdout)['error']}")
+    assert "nowhere: cannot be read" in line
+
+
+@pytest.mark.parametrize("words", ["--help", "hist {record}", "hist {record} --json", "check nowhere --json"])
+def test_a_full_disk_is_told_in_a_line(words: str, tmp_path: Path) -> None:
+    record = tmp_path / "times.csv"
+    record.write_text("1.0\n2.0\n", encoding="utf-8")
+    done = reconros(words.format(record=record), ">/dev/full")
+    last = done.stderr.splitlines()[-1]
+    assert (done.returncode, last) == (
+        1,
+        "reconros: the output cannot be written: No space left on device",
+    )
+    assert "Traceback" not in done.stderr
+
+
+def test_closed_streams_do_not_matter(tmp_path: Path) -> None:
+    record = tmp_path / "times.csv"
+    record.write_text("1.0\n2.0\n", encoding="utf-8")
+    done = reconros(f"hist {record} --png {tmp_path / 'times.png'}", "<&- >&- 2>&-")
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+    assert (tmp_path / "times.png").read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize(
+    ("encoding", "name", "shown"),
+    [("latin-1", "\u2192".encode(), b"\\u2192"), ("utf-8", b"\xff", b"\\udcff")],
+    ids=["an arrow in latin-1", "what is no UTF-8"],
+)
+def test_a_path_that_stdout_has_no_letters_for(
+    encoding: str, name: bytes, shown: bytes, tmp_path: Path
+) -> None:
+    (tmp_path / "times.csv").write_text("1.0\n2.0\n", encoding="utf-8")
+    drawing = os.fsdecode(name + b".png")
+    command = [sys.executable, "-m", "reconros_zenoh", "hist", "times.csv", "--png", drawing]
+    environment = {
+        **os.environ,
+        "PYTHONPATH": os.pathsep.join(sys.path),
+        "PYTHONUTF8": "1",
+        "PYTHONIOENCODING": encoding,
+    }
+    done = subprocess.run(
+        command, cwd=tmp_path, env=environment, capture_output=True, timeout=120, check=False
+    )
+    assert (done.returncode, done.stderr) == (0, b"")
+    assert done.stdout.endswith(b"drawn to " + shown + b".png\n")
+    assert {path.name for path in tmp_path.iterdir()} == {"times.csv", drawing}

@@ -226,7 +226,7 @@ def test_up_detached_that_fails_leaves_nothing(services: Services, run: Run) -> 
     done = run("up", "-d", "--json")
     assert done.returncode == 1
     assert json.loads(done.stdout)["services"]["server"] == "stopped"
-    assert done.stderr.startswith("Service server does not get healthy")
+    assert done.stderr.startswith("reconros: Service server does not get healthy")
     services.assert_gone()
 
 

@@ -199,6 +199,7 @@ def test_points_of_one_size_tell_the_number_of_subscribers() -> None:
     [
         ("--sizes", "10", "'10' is no message size"),
         ("--sizes", "0kB", "'0kB' is no message size"),
+        ("--sizes", "1001MB", "Write whole numbers of B, kB or MB up to 1000MB"),
         ("--subscribers", "2,9", "'2,9' are no numbers of subscribers"),
         ("--subscribers", "", "are no numbers of subscribers"),
     ],

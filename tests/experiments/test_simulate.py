@@ -244,3 +244,10 @@ def test_a_folder_that_cannot_be_made_is_an_error_before_anything_runs(tmp_path:
     (tmp_path / "out").touch()
     with pytest.raises(UsageError, match="Choose another --out"):
         run("-f", ROUNDTRIP, "--out", tmp_path / "out")
+
+
+def test_more_boards_than_memory_holds_are_refused(tmp_path: Path) -> None:
+    words = ["-f", str(ROUNDTRIP), "--boards", "1000000000", "--out", str(tmp_path)]
+    done = CliRunner().invoke(application, words)
+    assert done.exit_code == 2
+    assert "Invalid value for '--boards'" in done.stderr

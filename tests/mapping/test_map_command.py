@@ -175,3 +175,10 @@ def test_what_cannot_be_done_is_refused(arguments: tuple[object, ...], says: str
 def test_a_folder_without_a_project(tmp_path: Path) -> None:
     with pytest.raises(FileError, match=r"build\.cfg: cannot be read"):
         run(tmp_path)
+
+
+def test_what_check_refuses_is_not_mapped(tmp_path: Path) -> None:
+    streams = "".join(f"{name} = rospub, node, sensor_msgs/{name}, /s, hw\n" for name in ("Image", "Imu"))
+    path = write(tmp_path, f'[ResourceGroup@g]\nnode = rosnode, "/n"\n{streams}')
+    with pytest.raises(FileError, match=f"{path}:4: /s has the type sensor_msgs/msg/Imu here"):
+        run(tmp_path)

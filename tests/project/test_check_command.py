@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -209,3 +210,12 @@ def test_topics_that_cannot_be_mapped_are_refused(tmp_path: Path) -> None:
     )
     with pytest.raises(FileError, match=r"build\.cfg:5: /a is mapped to hardware \(line 3\)"):
         run(path)
+
+
+def test_the_mapping_files_of_a_folder_are_read(tmp_path: Path) -> None:
+    folder = shutil.copytree(application_folder(), tmp_path / "project")
+    run(folder)
+    mapping = folder / "mappings" / "mixed.toml"
+    mapping.write_text(mapping.read_text(encoding="utf-8") + "bogus = 3\n", encoding="utf-8")
+    with pytest.raises(FileError, match=r"mixed\.toml:\d+: .*bogus: unknown key"):
+        run(folder)

@@ -12,8 +12,9 @@ from networkx.algorithms import bipartite
 
 from reconros_zenoh.errors import FileError
 from reconros_zenoh.project.build_cfg import read_build_cfg
-from reconros_zenoh.project.communication import check_places, check_topics, gateway_slots
+from reconros_zenoh.project.communication import check_fifos, check_places, check_topics, gateway_slots
 from reconros_zenoh.project.mapping_file import CallbackMapping, Mapping
+from reconros_zenoh.ros.types import TypeRegistry
 
 HEAD = """[HwSlot@slot(0:1)]
 Id = 0
@@ -105,6 +106,33 @@ def test_what_cannot_be_mapped_is_refused(tmp_path, text, line, words) -> None:
     with pytest.raises(FileError) as refused:
         check_topics(configuration(tmp_path, text))
     assert refused.value.line == line
+    assert words in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("end", "words"),
+    {
+        "rossub, node, std_msgs/UInt32, /a, hw, 2, block, 8": None,
+        "rossub, node, std_msgs/UInt32, /a, hw, 2, block, 7": (
+            "message_bytes of hw is 7, but no message of the type std_msgs/msg/UInt32 has fewer than 8 bytes"
+        ),
+        "rospub, node, std_msgs/UInt32, /a, hw, 8": None,
+        "rospub, node, std_msgs/UInt32, /a, hw, 7": "message_bytes of hw is 7",
+        "rossub, node, std_msgs/UInt32, /a, hw": None,
+        # 4 + stamp 8, frame_id 5 (8), height and width 8, encoding 5, is_bigendian 1 (3), step 4, count 4.
+        "rossub, node, sensor_msgs/Image, /a, hw, 2, drop, 44": None,
+        "rossub, node, sensor_msgs/Image, /a, hw, 2, drop, 43": "fewer than 44 bytes",
+        "rospub, node, std_msgs/UInt23, /a, hw, 8": "hw: ",
+    }.items(),
+)
+def test_a_fifo_has_room_for_the_smallest_message(tmp_path, end, words) -> None:
+    project = configuration(tmp_path, f"hw = {end}\n")
+    if words is None:
+        check_fifos(project, TypeRegistry)
+        return
+    with pytest.raises(FileError) as refused:
+        check_fifos(project, TypeRegistry)
+    assert refused.value.line == 9
     assert words in str(refused.value)
 
 

@@ -93,6 +93,7 @@ MISTAKES = {
     "unknown executor": (GOOD.replace("reconros", "other"), 1, "'reconros' or 'standard'"),
     "no executor": (GOOD.split("\n", 1)[1], None, "executor: Field required"),
     "no workers": (GOOD.replace("software_workers = 2\n", ""), None, "software_workers: Field required"),
+    "a hundred million workers": (GOOD.replace("= 2", "= 100000000"), 2, "less than or equal to 1000"),
     "negative workers": (GOOD.replace("= 2", "= -2"), 2, "software_workers"),
     "negative hardware workers": ("hardware_workers = -1\n" + GOOD, 1, "hardware_workers"),
     "workers that are no number": (GOOD.replace("= 2", "= true"), 2, "valid integer"),

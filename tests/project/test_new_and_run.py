@@ -163,9 +163,11 @@ def test_a_folder_that_is_there_is_left_alone(blink: Path) -> None:
     assert (blink / "main.py").read_text(encoding="utf-8") == "mine"
 
 
-def test_a_time_without_an_end(blink: Path) -> None:
-    with pytest.raises(UsageError, match="give a number"):
-        run(blink, "--seconds", "inf")
+@pytest.mark.parametrize("seconds", ["inf", "nan", "1e300", "-1"])
+def test_a_time_that_cannot_be(seconds: str, blink: Path) -> None:
+    done = CliRunner().invoke(application, ["run", str(blink), "--clock", "virtual", "--seconds", seconds])
+    assert done.exit_code == 2
+    assert "Invalid value for '--seconds'" in done.stderr
 
 
 def test_two_projects_with_modules_of_the_same_names_stay_apart(tmp_path: Path) -> None:

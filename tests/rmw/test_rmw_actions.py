@@ -207,7 +207,7 @@ def test_old_results_are_forgotten() -> None:
     for _ in range(120):
         case.send()
         case.finish(case.goals[-1])
-    assert len(case.server._goals) == len(case.server._results) == 100
+    assert len(case.server._goals) == len(case.server._entries) == len(case.server._results) == 100
 
 
 @settings(max_examples=40, deadline=None)

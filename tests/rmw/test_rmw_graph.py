@@ -53,6 +53,25 @@ def test_every_endpoint_appears_with_its_name_type_and_qos(sessions: TwoSessions
     }
 
 
+def test_a_node_forgets_an_endpoint_that_is_closed(sessions: TwoSessions) -> None:
+    node = sessions.here.node("brief")
+    word, set_bool = types().message("std_msgs/msg/UInt32"), types().service("std_srvs/srv/SetBool")
+    lasting = node.publisher(word, "out")
+    brief = (
+        node.publisher(word, "out"),
+        node.subscription(word, "/in", lambda _: None),
+        node.service(set_bool, "~/switch", lambda _: None),
+        node.client(set_bool, "other"),
+    )
+    assert list(node.endpoints) == [lasting, *brief]
+    for endpoint in brief:
+        endpoint.close()
+    assert list(node.endpoints) == [lasting]
+    node.close()
+    assert not node.endpoints
+    assert sessions.tokens() == []
+
+
 def test_ids_count_on_over_the_nodes_of_a_session(sessions: TwoSessions) -> None:
     word = types().message("std_msgs/msg/UInt32")
     for name in ("first", "second"):

@@ -191,7 +191,13 @@ BAD = {
     "no attachment": (GOOD_KEY, GOOD, None, "no_attachment", "has no attachment"),
     "short attachment": (GOOD_KEY, GOOD, attachment()[:-1], "no_attachment", "32 bytes instead of 33"),
     "truncated CDR": (GOOD_KEY, GOOD[:-1], attachment(), "truncated", "std_msgs/msg/UInt32, 7 bytes"),
-    "no CDR": (GOOD_KEY, b"", attachment(), "truncated", "0 bytes hold no encapsulation header"),
+    "no CDR": (
+        GOOD_KEY,
+        b"",
+        attachment(),
+        "truncated",
+        "no encapsulation header",
+    ),
     "big endian": (GOOD_KEY, b"\x00\x00" + GOOD[2:], attachment(), "foreign_encoding", "CDR big endian"),
     "refused by the callback's check": (GOOD_KEY, GOOD[:4] + b"\x0d\0\0\0", attachment(), "leg", "13 legs"),
 }

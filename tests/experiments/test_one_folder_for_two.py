@@ -1,0 +1,45 @@
+"""Two experiments at the same time do not mix their files."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+import deploy
+from reconros_zenoh.cli.main import _application
+from reconros_zenoh.errors import UsageError
+from reconros_zenoh.experiments.provenance import own_folder
+
+COMMANDS = {
+    "experiment roundtrip --clock virtual --requests 1": "virtual",
+    "experiment design --clock virtual": "virtual",
+    "experiment gateway": "",
+    f"simulate -f {Path(deploy.__file__).with_name('roundtrip.yaml')}": "",
+}
+
+
+@pytest.mark.parametrize(("command", "folder"), COMMANDS.items())
+def test_a_folder_that_another_experiment_writes_to_is_refused(
+    command: str, folder: str, tmp_path: Path
+) -> None:
+    (tmp_path / folder).mkdir(exist_ok=True)
+    kept = tmp_path / folder / "experiment.json"
+    kept.write_text("of the other", encoding="utf-8")
+    words = [*command.split(), "--out", str(tmp_path)]
+    with own_folder(tmp_path / folder):
+        done = CliRunner().invoke(_application(words[:1]), words)
+    assert isinstance(done.exception, UsageError)
+    assert f"another experiment is writing to {tmp_path / folder}" in str(done.exception)
+    assert kept.read_text(encoding="utf-8") == "of the other"
+
+
+def test_the_folder_is_free_again(tmp_path: Path) -> None:
+    with pytest.raises(ZeroDivisionError), own_folder(tmp_path / "new"):
+        raise ZeroDivisionError
+    with own_folder(tmp_path / "new"), pytest.raises(UsageError, match=re.escape(str(tmp_path))):
+        own_folder(tmp_path / "new").__enter__()
+    with own_folder(tmp_path / "new"):
+        pass
