@@ -28,6 +28,9 @@ if TYPE_CHECKING:
 # Only what sends is apart: a callback that publishes a large message without shared memory waits for it, in
 # the same pool in vain, and then the message is dropped.
 _THREADS = "(rx: (handover: net), tx: (worker_threads: 1), acc: (handover: net), net: (worker_threads: 4))"
+# A router passes messages on with the threads that receive: one that waits for a slow link would keep its own
+# pool from seeing that the link has room again. So its pools are Zenoh's own.
+_ROUTER_THREADS = "()"
 
 # From here on [byte] Zenoh hands messages over by shared memory. A round trip of 16 KiB took 0.20 ms with it
 # and 0.18 without, 32 KiB 0.20 both, 64 KiB 0.23 and 0.28; Zenoh's own default is 3 KiB.
@@ -69,6 +72,11 @@ def configuration(mode: str, endpoints: dict[str, str]) -> zenoh.Config:
     config.insert_json5(f"{_DROP}/wait_before_drop", json.dumps(_WAIT_US))
     config.insert_json5(f"{_DROP}/max_wait_before_drop_fragments", json.dumps(_WAIT_LARGE_US))
     return config
+
+
+def use_threads_of_a_router() -> None:
+    """Make this process one that only routes; to be called before it opens its router."""
+    os.environ.setdefault("ZENOH_RUNTIME", _ROUTER_THREADS)
 
 
 @cache

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import re
 import socket
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import ExitStack
 from itertools import count
 from threading import Condition, Event, Thread, get_ident, local
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 import pytest
+from links import as_another_host_does, free_endpoint, slow_link
 
 from reconros_zenoh.clock.virtual import VirtualEnvironment
 from reconros_zenoh.errors import TransportError, UsageError
 from reconros_zenoh.ros.qos import Durability, History, QosProfile, Reliability
-from reconros_zenoh.transport import frames, zenoh_session
+from reconros_zenoh.transport import zenoh_session
 from reconros_zenoh.transport.simulated import SimulatedNetwork
 from reconros_zenoh.transport.zenoh import ZenohRouter, ZenohTransport
 
@@ -113,11 +114,6 @@ class ZenohNetwork(RoutedNetwork):
         return session
 
 
-def free_endpoint() -> str:
-    with socket.create_server(("127.0.0.1", 0)) as server:
-        return f"tcp/127.0.0.1:{server.getsockname()[1]}"
-
-
 @pytest.fixture(scope="module")
 def router() -> Iterator[str]:
     endpoint = free_endpoint()
@@ -125,43 +121,9 @@ def router() -> Iterator[str]:
         yield endpoint
 
 
-def as_another_host_does(router: str) -> str:
-    """Return an endpoint of a router on the loopback that does not look like one."""
-    return router.replace("127.0.0.1", "0.0.0.0")
-
-
-@contextmanager
-def halting_link(router: str) -> Iterator[str]:
-    """Give an endpoint from which a session reaches the router, with a halt of 0.3 s behind the first MB.
-
-    So a link halts that has lost a packet.
-    """
-
-    def pass_on(source: socket.socket, sink: socket.socket) -> None:
-        passed = 0
-        with suppress(OSError):
-            while part := source.recv(65_536):
-                if passed < 1_000_000 <= passed + len(part):
-                    Event().wait(0.3)
-                passed += len(part)
-                sink.sendall(part)
-
-    def serve() -> None:
-        near, _ = server.accept()
-        host, port = router.removeprefix("tcp/").split(":")
-        with near, socket.create_connection((host, int(port))) as far:
-            back = Thread(target=pass_on, args=(far, near), daemon=True)
-            back.start()
-            pass_on(near, far)
-            far.shutdown(socket.SHUT_RDWR)
-            back.join(LIMIT_S)
-
-    with socket.create_server(("127.0.0.1", 0)) as server:
-        server.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 65_536)  # else it takes the message meanwhile
-        thread = Thread(target=serve, daemon=True)
-        thread.start()
-        yield as_another_host_does(f"tcp/127.0.0.1:{server.getsockname()[1]}")
-        thread.join(LIMIT_S)
+@pytest.fixture
+def without_shared_memory(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(zenoh_session, "has_shared_memory", lambda: False)
 
 
 @pytest.fixture(params=["simulated", "zenoh", "zenoh between hosts"])
@@ -688,11 +650,8 @@ def test_a_publisher_is_closed_while_another_thread_sends(router: str) -> None:
         assert KEY in str(refused[0])
 
 
-def test_a_callback_may_publish_what_no_shared_memory_takes(
-    router: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(zenoh_session, "_SHARED_FROM", 2**30)
-    monkeypatch.setattr(frames, "_SMALLEST_FRAME_BYTES", 2**30)
+@pytest.mark.usefixtures("without_shared_memory")
+def test_a_callback_may_publish_what_no_shared_memory_takes(router: str) -> None:
     whole = QosProfile(history=History.KEEP_ALL)  # waits rather than loses
     inbox = Inbox(Condition())
     with ZenohTransport.open(router) as here, ZenohTransport.open(router) as there:
@@ -710,12 +669,11 @@ def test_a_callback_may_publish_what_no_shared_memory_takes(
     assert len(inbox.items) == 3
 
 
-def test_a_large_message_waits_for_a_link_that_halts(router: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(zenoh_session, "_SHARED_FROM", 2**30)  # shared memory needs no link
-    monkeypatch.setattr(frames, "_SMALLEST_FRAME_BYTES", 2**30)
+@pytest.mark.usefixtures("without_shared_memory")
+def test_a_large_message_waits_for_a_slow_link(router: str) -> None:
     inbox = Inbox(Condition())
-    message = np.random.default_rng(0).bytes(16_000_000)  # more than the sender's socket takes meanwhile
-    with halting_link(router) as far, ExitStack() as sessions:
+    message = np.random.default_rng(0).bytes(6_000_000)
+    with slow_link(router) as far, ExitStack() as sessions:
         here = sessions.enter_context(ZenohTransport.open(router))
         there = sessions.enter_context(ZenohTransport.open(far))
         matched = Event()
