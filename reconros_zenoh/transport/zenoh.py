@@ -23,7 +23,13 @@ from reconros_zenoh.transport.changes import MatchingChanges, TokenChanges, gath
 from reconros_zenoh.transport.frames import Frames
 from reconros_zenoh.transport.guard import Closing, GuardedDeclaration
 from reconros_zenoh.transport.key_expressions import check_concrete
-from reconros_zenoh.transport.zenoh_session import configuration, direct, is_of_this_host, open_pool
+from reconros_zenoh.transport.zenoh_session import (
+    configuration,
+    direct,
+    is_of_this_host,
+    open_pool,
+    open_session,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -49,7 +55,7 @@ class ZenohRouter(Closing):
         config = configuration("router", {"listen/endpoints": listen})
         config.insert_json5("scouting/delay", "0")  # else it scouts half a second for nobody
         try:
-            return cls(zenoh.open(config))
+            return cls(open_session(config))
         except zenoh.ZError as error:
             remedy = "Use the router that runs there, or choose another endpoint."
             raise TransportError(f"no router can listen on {listen}: {_reason(error)}. {remedy}") from error
@@ -91,7 +97,7 @@ class ZenohTransport(Closing):
         config.insert_json5("connect/exit_on_failure", "true")
         config.insert_json5("connect/retry", "{period_init_ms: 100, period_max_ms: 1000}")
         try:
-            return cls(zenoh.open(config))
+            return cls(open_session(config))
         except zenoh.ZError as error:
             raise TransportError(f"no Zenoh router at {router}: start one with `reconros router`") from error
 

@@ -31,6 +31,7 @@ _THREADS = "(rx: (handover: net), tx: (worker_threads: 1), acc: (handover: net),
 # A router passes messages on with the threads that receive: one that waits for a slow link would keep its own
 # pool from seeing that the link has room again. So its pools are Zenoh's own.
 _ROUTER_THREADS = "()"
+_RUNTIME = "ZENOH_RUNTIME"
 
 # From here on [byte] Zenoh hands messages over by shared memory. A round trip of 16 KiB took 0.20 ms with it
 # and 0.18 without, 32 KiB 0.20 both, 64 KiB 0.23 and 0.28; Zenoh's own default is 3 KiB.
@@ -56,7 +57,6 @@ _thread = threading.local()
 
 def configuration(mode: str, endpoints: dict[str, str]) -> zenoh.Config:
     """Return the configuration of rmw_zenoh (gossip is on); raises UsageError when an endpoint is none."""
-    os.environ.setdefault("ZENOH_RUNTIME", _THREADS)  # read when the first session of a process opens
     config = zenoh.Config()
     config.insert_json5("mode", json.dumps(mode))
     for entry, endpoint in endpoints.items():
@@ -74,9 +74,23 @@ def configuration(mode: str, endpoints: dict[str, str]) -> zenoh.Config:
     return config
 
 
+def open_session(config: zenoh.Config) -> zenoh.Session:
+    """Return a new session; raises ZError. The first one of a process makes the threads for all.
+
+    They are those that suit boards and clients, unless the environment names others.
+    """
+    if _RUNTIME in os.environ:
+        return zenoh.open(config)
+    os.environ[_RUNTIME] = _THREADS
+    try:
+        return zenoh.open(config)
+    finally:
+        os.environ.pop(_RUNTIME, None)  # else the processes that this one starts would have them, too
+
+
 def use_threads_of_a_router() -> None:
     """Make this process one that only routes; to be called before it opens its router."""
-    os.environ.setdefault("ZENOH_RUNTIME", _ROUTER_THREADS)
+    os.environ.setdefault(_RUNTIME, _ROUTER_THREADS)
 
 
 @cache

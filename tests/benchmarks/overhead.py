@@ -130,21 +130,19 @@ def run() -> list[dict[str, Any]]:
     tune_memory()
     router = f"tcp/127.0.0.1:{free_port()}"
     board = ["-m", "board_daemon", str(ECHO), "--profile=native", "--mapping=software", "--name=echo"]
-    # What our transport sets for its own process must not reach the rival's.
-    plain = {name: value for name, value in os.environ.items() if name != "ZENOH_RUNTIME"}
     with ExitStack() as stack:
         stack.enter_context(ZenohRouter.open(router))
-        stack.enter_context(child([*board, "--router", router], plain))
-        stack.enter_context(child([__file__, "--raw-echo", router], plain))
-        rival = stack.enter_context(child([__file__, "--raw-client", router], plain))
+        stack.enter_context(child([*board, "--router", router]))
+        stack.enter_context(child([__file__, "--raw-echo", router]))
+        rival = stack.enter_context(child([__file__, "--raw-client", router]))
         return measure(router, rival)
 
 
 @contextmanager
-def child(words: list[str], environment: dict[str, str]) -> Iterator[subprocess.Popen[str]]:
+def child(words: list[str]) -> Iterator[subprocess.Popen[str]]:
     """Run a Python process that says when it is ready, and end it at the end."""
     process = subprocess.Popen(
-        [sys.executable, *words], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=environment
+        [sys.executable, *words], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
     )
     try:
         assert process.stdout is not None
