@@ -13,11 +13,12 @@ from reconros_zenoh.cli.main import _application
 from reconros_zenoh.errors import UsageError
 from reconros_zenoh.experiments.provenance import own_folder
 
+DEPLOYMENT = Path(deploy.__file__).with_name("roundtrip.yaml")
 COMMANDS = {
     "experiment roundtrip --clock virtual --requests 1": "virtual",
     "experiment design --clock virtual": "virtual",
     "experiment gateway": "",
-    f"simulate -f {Path(deploy.__file__).with_name('roundtrip.yaml')}": "",
+    "simulate -f DEPLOYMENT": "",
 }
 
 
@@ -28,7 +29,8 @@ def test_a_folder_that_another_experiment_writes_to_is_refused(
     (tmp_path / folder).mkdir(exist_ok=True)
     kept = tmp_path / folder / "experiment.json"
     kept.write_text("of the other", encoding="utf-8")
-    words = [*command.split(), "--out", str(tmp_path)]
+    given = [str(DEPLOYMENT) if word == "DEPLOYMENT" else word for word in command.split()]
+    words = [*given, "--out", str(tmp_path)]
     with own_folder(tmp_path / folder):
         done = CliRunner().invoke(_application(words[:1]), words)
     assert isinstance(done.exception, UsageError)
