@@ -5,10 +5,6 @@ from __future__ import annotations
 import subprocess
 import sys
 
-import pytest
-
-pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="other systems have no such limit")
-
 # A process keeps the right of root to lock as much as it likes until it executes the next program.
 AS_ORDINARY_USER = """
 import ctypes, os, resource, sys
