@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import os
 import signal
+import subprocess
+import sys
 import time
 from threading import Event, Lock, Thread, current_thread, get_ident
 from typing import TYPE_CHECKING
@@ -287,3 +289,10 @@ def test_a_signal_handler_may_post_to_a_loop_that_sleeps_in_the_main_thread(
         ended.set()
         join(sender)
         signal.signal(signal.SIGUSR1, before)
+
+
+def test_a_punctual_process_leaves_one_core_to_a_computation() -> None:
+    lines = ("from reconros_zenoh.clock.wall import keep_time", "keep_time()", "import cv2")
+    program = "; ".join((*lines, "print(cv2.getNumThreads())"))
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert done.stdout == "1\n"

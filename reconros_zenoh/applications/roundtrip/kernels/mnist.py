@@ -32,8 +32,8 @@ class Classifier:
     guards it instead of one network per thread: a call takes a fraction of a millisecond, less than loading
     another network does, and OpenCV releases the GIL meanwhile.
 
-    OpenCV may split a call over its own threads. One would do for so small a network, but their number can
-    only be set for the whole process (`cv2.setNumThreads`), which is for the process to decide.
+    OpenCV may split a call over its own threads. One does better for so small a network, but their number can
+    only be set for the whole process, which is for the process to decide: daemons do (`keep_time`).
     """
 
     def __init__(self, model: Path = MODEL) -> None:
