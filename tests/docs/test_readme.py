@@ -15,12 +15,12 @@ from contextlib import ExitStack
 from typing import TYPE_CHECKING
 
 import pytest
+from links import free_endpoint
 from pages import README, ROOT, blocks, invoke
 from processes import Process, run
 
 from reconros_zenoh.applications.roundtrip.kernels.mnist import MODEL
 from reconros_zenoh.experiments.roundtrip import application_folder
-from reconros_zenoh.experiments.wall import free_port
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -85,7 +85,7 @@ def test_the_commands_run_in_their_order(folder: Path) -> None:
 def test_the_commands_with_processes_run_in_their_order(folder: Path) -> None:
     invoke("reconros new blink")
     invoke("reconros build reconros_zenoh/applications/roundtrip --out bitstreams")
-    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    endpoint = free_endpoint()
     with ExitStack() as terminals:
         boards: dict[str, Process] = {}
         for command in filter(PROCESS.match, commands()):

@@ -16,10 +16,9 @@ from contextlib import ExitStack
 from typing import TYPE_CHECKING
 
 import pytest
+from links import free_endpoint
 from pages import README, ROOT, blocks, invoke
 from processes import Process, run
-
-from reconros_zenoh.experiments.wall import free_port
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -51,7 +50,7 @@ def check_output(printed: list[str], shown: list[str], place: str) -> None:
 
 def run_in_terminals(text: str, place: str) -> None:
     """Run each command as a process and end those that go on."""
-    endpoint = f"tcp/127.0.0.1:{free_port()}"
+    endpoint = free_endpoint()
     with ExitStack() as terminals:
         running = []
         for command, shown in transcript(text):

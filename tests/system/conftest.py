@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import socket
 from typing import TYPE_CHECKING, NamedTuple
 
 import pytest
+from links import free_endpoint
 from processes import Process
 
 from reconros_zenoh.experiments.roundtrip import application_folder
@@ -27,20 +27,15 @@ class Network(NamedTuple):
     transport: ZenohTransport
 
 
-def _free_endpoint() -> str:
-    with socket.create_server(("127.0.0.1", 0)) as server:
-        return f"tcp/127.0.0.1:{server.getsockname()[1]}"
-
-
 @pytest.fixture
 def endpoint() -> str:
     """Return an endpoint at which nothing listens."""
-    return _free_endpoint()
+    return free_endpoint()
 
 
 @pytest.fixture(scope="session")
 def network() -> Iterator[Network]:
-    endpoint = _free_endpoint()
+    endpoint = free_endpoint()
     with (
         Process("router", "--listen", endpoint) as router,
         Process("--router", endpoint, program=("-m", "board_daemon")) as board,

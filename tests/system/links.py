@@ -7,6 +7,8 @@ from contextlib import contextmanager, suppress
 from threading import Event, Thread
 from typing import TYPE_CHECKING
 
+from reconros_zenoh.experiments.wall import free_port
+
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
@@ -16,8 +18,7 @@ _BUFFER_BYTES = 65_536  # larger ones take a whole message meanwhile
 
 
 def free_endpoint() -> str:
-    with socket.create_server(("127.0.0.1", 0)) as server:
-        return f"tcp/127.0.0.1:{server.getsockname()[1]}"
+    return f"tcp/127.0.0.1:{free_port()}"
 
 
 def as_another_host_does(router: str) -> str:

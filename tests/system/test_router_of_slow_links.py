@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from links import as_another_host_does, free_endpoint, slow_link
+from links import as_another_host_does, slow_link
 from processes import LIMIT_S, Process
 
 from reconros_zenoh.ros.qos import QosProfile
@@ -22,8 +22,7 @@ if TYPE_CHECKING:
 
 
 @pytest.fixture
-def router() -> Iterator[str]:
-    endpoint = free_endpoint()
+def router(endpoint: str) -> Iterator[str]:
     with Process("router", "--listen", endpoint) as process:
         process.wait_for("listens")
         yield endpoint
