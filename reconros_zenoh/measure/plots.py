@@ -35,13 +35,13 @@ GREY = "#8b949e"
 _MAPPING_COLOURS = ("#d2691e", "#2f7ec4", "#2a9267", "#9463c0", "#c2485a", "#8a7a1f")
 _STAGE_COLOURS = {
     "transport": "#7a8794",
-    "dds": "#2f7ec4",
-    "retransmission": "#e58fa8",
+    "dds": "#2467ab",
+    "retransmission": "#f0b3c4",
     "queue": "#d9a520",
-    "dispatch": "#8a7a1f",
-    "reconfiguration": "#c2485a",
-    "execution": "#2a9267",
-    "memif": "#9463c0",
+    "dispatch": "#a39228",
+    "reconfiguration": "#b03a50",
+    "execution": "#4fb98b",
+    "memif": "#7a45ab",
     "osif": "#5cb8c4",
     "blocked": "#c9d1d9",
     "hmt": "#9fc46b",
@@ -51,6 +51,7 @@ _STAGE_COLOURS = {
 _GRID_BINS = 60
 _GRID_PERCENTILES = (1.0, 50.0, 95.0)
 _FAR_APART = 5.0
+_LEGEND_COLUMNS = 7
 
 
 def grid_figure(records: Mapping[str, Mapping[str, Record]]) -> Figure:
@@ -100,7 +101,9 @@ def spans_figure(spans: Mapping[str, Mapping[str, Mapping[str, float]]]) -> Figu
     colours = _stage_colours(stage for row in spans.values() for cell in row.values() for stage in cell)
     places = range(len(spans))
     with drawing_style():
-        figure = Figure(figsize=(2.7 * len(clients) + 1.5, 0.45 * len(spans) + 1.3), layout="constrained")
+        lines = -(-len(colours) // _LEGEND_COLUMNS)
+        size = max(1.9 * len(clients) + 1.2, 10.0), 0.4 * len(spans) + 0.2 * lines + 1.0
+        figure = Figure(figsize=size, layout="constrained")
         grid = figure.subplots(1, len(clients), squeeze=False, sharey=True)[0]
         for axes, client in zip(grid, clients, strict=True):
             left = np.zeros(len(spans))
@@ -111,15 +114,21 @@ def spans_figure(spans: Mapping[str, Mapping[str, Mapping[str, float]]]) -> Figu
             for place, total in zip(places, left.tolist(), strict=True):
                 if total:
                     axes.annotate(f" {format_ms(total)}", (total, place), va="center", fontsize=8)
-            axes.set_title(client, loc="left", fontweight="bold")
+            axes.set_title(_wrap(client, 18), loc="left", fontweight="bold")
             axes.set_xlim(0, left.max() * 1.25 or 1.0)
             axes.locator_params(axis="x", nbins=4)
             axes.set_yticks(places, [_wrap(mapping, 24) for mapping in spans])
         grid[0].invert_yaxis()
         figure.supxlabel("mean time [ms]")
         handles, labels = grid[0].get_legend_handles_labels()
-        columns = min(len(colours), 2 * len(clients) + 1)
-        figure.legend(handles, labels, loc="outside upper left", ncols=columns)
+        # A legend is filled column by column; the way of a message is read line by line.
+        order = [i for first in range(_LEGEND_COLUMNS) for i in range(first, len(labels), _LEGEND_COLUMNS)]
+        figure.legend(
+            [handles[i] for i in order],
+            [labels[i] for i in order],
+            loc="outside upper left",
+            ncols=_LEGEND_COLUMNS,
+        )
     return figure
 
 

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from itertools import pairwise
 from typing import get_args
 from xml.etree import ElementTree as ET
 
@@ -117,3 +118,18 @@ def test_measuring_does_not_load_the_drawing_library():
 def test_each_stage_has_a_colour_of_its_own():
     assert set(plots._STAGE_COLOURS) == set(get_args(Stage))
     assert len(set(plots._STAGE_COLOURS.values())) == len(plots._STAGE_COLOURS)
+
+
+def luminance(colour):
+    """The relative luminance of WCAG 2."""
+    parts = [int(colour[at : at + 2], 16) / 255 for at in (1, 3, 5)]
+    linear = [part / 12.92 if part <= 0.04045 else ((part + 0.055) / 1.055) ** 2.4 for part in parts]
+    return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+
+
+def test_stages_that_follow_each_other_differ_in_grey():
+    greys = [luminance(colour) + 0.05 for colour in plots._STAGE_COLOURS.values()]
+    assert [max(pair) / min(pair) < 1.15 for pair in pairwise(greys)].count(True) == 0
+    # The two that most often take most of the time.
+    dds, execution = (luminance(plots._STAGE_COLOURS[stage]) + 0.05 for stage in ("dds", "execution"))
+    assert execution / dds > 2
