@@ -120,8 +120,8 @@ def host_troubles(host: Mapping[str, Any]) -> list[str]:
     late_us = host.get("lag_p99_us")
     if late_us is not None and late_us > LATE_US:
         troubles.append(
-            f"One event in a hundred of the board came more than {late_us / 1e3:.1f} ms late: in the tails, "
-            "the shortest round trips are longer by about that."
+            f"One event in a hundred of the board came more than {late_us / 1e3:.1f} ms late: the "
+            "tails of short round trips are longer by about that."
         )
     return troubles
 

@@ -19,7 +19,7 @@ _STYLE = """
 @media (prefers-color-scheme: dark) { :root { --paper: #0f1318; --ink: #e6edf3; --line: #30363d;
   --soft: #171c23; --good: #3fb950; --fair: #d29922; --bad: #ff7b72; } }
 body { margin: 0 auto; padding: 1.5rem; max-width: 75rem; background: var(--paper); color: var(--ink);
-  font: 16px/1.55 system-ui, sans-serif; }
+  font: 1rem/1.55 system-ui, sans-serif; }
 h1 { line-height: 1.2; } h2 { margin-top: 2.5rem; border-bottom: 1px solid var(--line); }
 p, li, figcaption { max-width: 52rem; }
 figure { margin: 1rem 0; } figcaption, .small { font-size: 0.87rem; opacity: 0.85; }
@@ -31,6 +31,10 @@ th { background: var(--soft); font-weight: 600; }
 .good { color: var(--good); } .fair { color: var(--fair); } .bad { color: var(--bad); }
 .bar { display: inline-block; height: 0.7em; background: var(--grey); vertical-align: baseline; }
 .warning { border-left: 4px solid var(--bad); background: var(--soft); padding: 0.6rem 1rem; }
+/* Paper does not scroll: the widest table fits a sheet. */
+@page { size: landscape; }
+@media print { :root { font-size: 12px; } .wide { overflow: visible; } figure, tr { break-inside: avoid; }
+  h2, h3 { break-after: avoid; } }
 """
 
 _NUMBER = re.compile(r"[-+]?\d|-$|$")

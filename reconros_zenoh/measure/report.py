@@ -19,7 +19,7 @@ from reconros_zenoh.measure.statistics import format_error, format_ms, format_sp
 from reconros_zenoh.measure.trust import trust_section
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
     from pathlib import Path
 
     from reconros_zenoh.measure.markup import Cell
@@ -120,15 +120,15 @@ def _section(experiment: Mapping[str, Any], records: Mapping[str, Mapping[str, R
         "<h3>Speedups</h3>",
         _speedups(experiment),
     ]
-    spans = experiment.get("spans") or {}
+    spans = _in_order(experiment.get("spans") or {}, _clients(experiment["mappings"]))
     if any(spans.values()):
         parts += [
             "<h3>Where the time goes</h3>",
             figure(
                 inline_svg(spans_figure(spans)),
                 "Mean time per stage, client and mapping",
-                "The mean time of each stage on a message's way, from the request to the answer. The stages "
-                "are stacked; the number at the end is their sum.",
+                "The mean time of each stage on a message's way, from the request (or hash's timer) to "
+                "the answer. The stages are stacked; the number at the end is their sum.",
             ),
             "<details><summary>The same as a table</summary>",
             _stages(spans),
@@ -232,10 +232,21 @@ def _name(experiment: Mapping[str, Any]) -> str:
 
 def _by_client(cells: Mapping[str, Mapping[str, Any]]) -> list[tuple[str, str, Any]]:
     """Return the cells as (mapping, client, cell), with a client's mappings beside each other."""
-    clients = dict.fromkeys(client for row in cells.values() for client in row)
     return [
         (mapping, client, row[client])
-        for client in clients
+        for client in _clients(cells)
         for mapping, row in cells.items()
         if client in row
     ]
+
+
+def _clients(cells: Mapping[str, Mapping[str, Any]]) -> Iterable[str]:
+    return dict.fromkeys(client for row in cells.values() for client in row)
+
+
+def _in_order(cells: Mapping[str, Mapping[str, Any]], clients: Iterable[str]) -> dict[str, dict[str, Any]]:
+    """Return the cells with these clients first: a board tells them in the order of their first answers."""
+    return {
+        mapping: {client: row[client] for client in dict.fromkeys([*clients, *row]) if client in row}
+        for mapping, row in cells.items()
+    }

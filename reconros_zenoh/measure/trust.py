@@ -34,8 +34,8 @@ do not ship with this program. All intervals take the values as independent of e
 round trips are not quite, so they are rather too narrow.
 The intervals say how exactly one run gives a figure. They do not say how much the real board differs from \
 one day to another: its own medians moved by up to 6 %.
-Constants of the board profile that are marked assumed were not measured at all; `reconros calibrate` says \
-which of the calibrated ones the data do not determine.
+Constants of the board profile that are marked assumed were not measured at all; the command reconros \
+calibrate says which of the calibrated ones the data do not determine.
 """
 
 
@@ -190,22 +190,23 @@ def _ablation(ablation: Mapping[str, Any]) -> list[str]:
         rows.append(
             f"<tr><td>{escape(variant['off'])}</td>"
             f'<td><span class="bar" style="width:{width_em:.2f}em"></span></td>'
-            f"<td>{format_share(error)}</td><td>{format_error(error - complete)}</td>"
-            f"<td>{format_share(of['mean_absolute_error_without_hash'])}</td>"
-            f"<td>{of['within_10_percent']} of {of['cells']}</td>"
+            f'<td class="number">{format_share(error)}</td>'
+            f'<td class="number">{format_error(error - complete)}</td>'
+            f'<td class="number">{format_share(of["mean_absolute_error_without_hash"])}</td>'
+            f'<td class="number">{of["within_10_percent"]} of {of["cells"]}</td>'
             f"<td>{escape(worst['client'])} under {escape(worst['mapping'])} "
             f"({format_error(worst['error'])})</td></tr>"
         )
     head = "".join(
-        f"<th>{text}</th>"
-        for text in (
-            "switched off",
-            "mean absolute error of the medians",
-            "",
-            "more than with nothing off",
-            "without hash",
-            "within 10 %",
-            "worst",
+        f'<th class="{column}">{text}</th>'
+        for text, column in (
+            ("switched off", "text"),
+            ("mean absolute error of the medians", "text"),
+            ("", "number"),
+            ("more than with nothing off", "number"),
+            ("without hash", "number"),
+            ("within 10 %", "number"),
+            ("worst", "text"),
         )
     )
     how = (

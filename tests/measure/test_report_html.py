@@ -96,6 +96,20 @@ def test_the_tables_hold_the_figures_beside_the_real_boards(tmp_path, board_reco
     assert speedups[5:] == ["20.97", "18.18"]
 
 
+def test_stages_come_in_the_order_of_the_clients(tmp_path, board_records):
+    spans = {"mixed": {client: {"execution": 1.0} for client in reversed(board_records["mixed"])}}
+    html = written(tmp_path / "r.html", (experiment_of(board_records, spans=spans), board_records))
+    (stages,) = re.findall(r"<details>(.*?)</details>", html, flags=re.DOTALL)
+    assert re.findall(r'<tr><td class="text ">(\w+)', stages) == list(board_records["mixed"])
+
+
+def test_nothing_is_cut_on_paper(tmp_path, board_records):
+    html = written(tmp_path / "r.html", (experiment_of(board_records), board_records))
+    (on_paper,) = re.findall(r"@media print \{(.*)\}", html, flags=re.DOTALL)
+    assert ".wide { overflow: visible; }" in on_paper
+    assert "@page { size: landscape; }" in html
+
+
 def test_without_overruns_spans_or_software_the_report_says_less(tmp_path):
     records = {
         "mine": {"sort": like_the_board("mixed", "sort"), "dead": Record("dead", np.array([]), lost=5)}
