@@ -83,7 +83,9 @@ def gateway(
         print(json.dumps(result))
     else:
         _print(wide_console(), result)
-        print(f"drawings and gateway.json: {', '.join(map(str, paths))}")
+        print(f"{_RESULT} is in {out}")
+        for path in paths:
+            print(f"drawn to {path}")
     if result["interrupted"]:
         raise interrupted(quiet=as_json, measured=bool(result["cells"]))
 
@@ -104,7 +106,7 @@ def _write(out: Path, result: dict[str, Any]) -> list[Path]:
     paths = []
     for publisher in dict.fromkeys(cell["publisher"] for cell in result["cells"]):
         paths.append(out / _FIGURES[publisher])
-        write_figure(transmission_figure(result["cells"], publisher), paths[-1])
+        write_figure(transmission_figure(result, publisher), paths[-1])
     return paths
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from reconros_zenoh.measure.plots import GREY, INK, drawing_style
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
@@ -22,15 +22,15 @@ _SIDES = (
 )
 
 
-def transmission_figure(cells: Sequence[dict[str, Any]], publisher: str) -> Figure:
+def transmission_figure(result: Mapping[str, Any], publisher: str) -> Figure:
     """Return times (above) and speedups (below) over the message size, to hardware (left) and to software.
 
-    `cells` are those of the experiment's JSON. Line and marker tell the number of hardware subscribers. The
-    figures of the paper are lost: what they show is known from its text.
+    `result` is the experiment's JSON; its profile and clock stand below. Line and marker tell the number of
+    hardware subscribers. The figures of the paper are lost: what they show is known from its text.
     """
     from matplotlib.figure import Figure  # noqa: PLC0415  takes a second, as in plots.py
 
-    chosen = [cell for cell in cells if cell["publisher"] == publisher]
+    chosen = [cell for cell in result["cells"] if cell["publisher"] == publisher]
     with drawing_style():
         figure = Figure(figsize=(9, 6), layout="constrained")
         axes = figure.subplots(2, 2, sharex=True)
@@ -39,7 +39,7 @@ def transmission_figure(cells: Sequence[dict[str, Any]], publisher: str) -> Figu
             axes[0][column].set_title(f"{publisher} to {place}", loc="left", fontweight="bold")
         axes[0][0].set_ylabel("transmission time [ms]")
         axes[1][0].set_ylabel("speedup by the gateway")
-        figure.supxlabel("message size")
+        figure.supxlabel(f"message size; profile {result['profile']}, {result['clock']} time")
         _legend(figure, sorted({cell["subscribers"] for cell in chosen}))
     return figure
 

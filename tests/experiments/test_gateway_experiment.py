@@ -185,13 +185,13 @@ def test_the_command_prints_a_table(tmp_path) -> None:
 
 
 def test_points_of_one_size_tell_the_number_of_subscribers() -> None:
-    figure = transmission_figure(
-        [cell for cell in all_cells()["cells"] if cell["size"] == 10_000], "hardware"
-    )
+    cells = [cell for cell in all_cells()["cells"] if cell["size"] == 10_000]
+    figure = transmission_figure({**all_cells(), "cells": cells}, "hardware")
     markers = {line.get_marker() for line in figure.axes[0].get_lines()}
     shown = {handle.get_marker() for handle in figure.legends[0].legend_handles}
     assert len(markers) == 3
     assert markers <= shown
+    assert figure.get_supxlabel() == "message size; profile zcu104, virtual time"
 
 
 @pytest.mark.parametrize(
