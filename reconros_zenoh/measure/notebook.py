@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from reconros_zenoh.errors import UsageError
 from reconros_zenoh.measure.histogram import bin_edges
-from reconros_zenoh.measure.plots import draw_histogram
+from reconros_zenoh.measure.plots import draw_histogram, drawing_style
 from reconros_zenoh.measure.record import Record
 
 if TYPE_CHECKING:
@@ -32,9 +32,10 @@ def histogram(times_ms: npt.ArrayLike, title: str = "", bins: int = 40) -> Figur
     known = values_ms[~np.isnan(values_ms)]
     if not known.size:
         raise UsageError("a histogram of no times cannot be drawn. Measure some first.")
-    figure = NotebookFigure(figsize=(6, 3), layout="constrained")
     record = Record(title, known, lost=values_ms.size - known.size)
-    draw_histogram(figure.subplots(), record, bin_edges([known], bins), title)
-    figure.supxlabel("time [ms]")
-    figure.supylabel("relative frequency")
+    with drawing_style():
+        figure = NotebookFigure(figsize=(6, 3), layout="constrained")
+        draw_histogram(figure.subplots(), record, bin_edges([known], bins), title)
+        figure.supxlabel("time [ms]")
+        figure.supylabel("relative frequency")
     return figure

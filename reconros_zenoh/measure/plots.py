@@ -166,7 +166,7 @@ def write_histograms(path: Path, pairs: Sequence[tuple[NamedRecord, NamedRecord 
             axes.set_title(_medians(entry.record, "other", other_ms), loc="right", fontsize=8)
         for axes in grid[len(pairs) :]:
             axes.set_axis_off()
-        figure.supxlabel("round-trip time [ms]; above each panel its median")
+        figure.supxlabel("time [ms]; above each panel its median")  # of any kind
         figure.supylabel("relative frequency")
         behind_any = "compared with" if any(other for _, other in pairs) else None
         _legend(figure, "record", behind_any, _MAPPING_COLOURS[1:2])
@@ -174,11 +174,11 @@ def write_histograms(path: Path, pairs: Sequence[tuple[NamedRecord, NamedRecord 
 
 
 def draw_histogram(axes: Axes, record: Record, edges_ms: npt.NDArray[np.float64], title: str) -> None:
-    """Draw the record's histogram with its mean, and its median above it."""
-    with drawing_style():
-        _panel(axes, edges_ms, record, None, _MAPPING_COLOURS[1])
-        axes.set_title(f"{_wrap(title, 42)}\n", loc="left", fontweight="bold")
-        axes.set_title(_medians(record, "other", None), loc="right", fontsize=8)
+    """Draw the record's histogram in the style around it, with its mean, and its median above it."""
+    _panel(axes, edges_ms, record, None, _MAPPING_COLOURS[1])
+    axes.set_title(f"{_wrap(title, 42)}\n", loc="left", fontweight="bold")
+    mean = format_ms(float(record.values_ms.mean()))
+    axes.set_title(f"median {_medians(record, '', None)}, mean {mean} ms (dashed)", loc="right", fontsize=8)
 
 
 def inline_svg(figure: Figure) -> str:
