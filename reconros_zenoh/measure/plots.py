@@ -344,7 +344,7 @@ def _legend(figure: Figure, ours: str, behind: str | None, colours: Sequence[str
         handles.values(),
         handles,
         handler_map={tuple: HandlerTuple(ndivide=None, pad=0)},
-        loc="outside upper right",
+        loc="outside upper left",
         ncols=len(handles),
     )
 

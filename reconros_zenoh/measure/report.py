@@ -99,7 +99,7 @@ def _section(experiment: Mapping[str, Any], records: Mapping[str, Mapping[str, R
         parts.append(f"<p>{clock}</p>")
     if experiment["clock"] == "wall" and (troubles := host_troubles(experiment["host"])):
         parts.append(
-            "<p class=\"warning\"><b>These figures are the host's rather than the board's.</b> "
+            '<p class="warning"><b>These figures are partly the host\'s.</b> '
             f"{' '.join(troubles)} Trust the virtual clock, or run again on a less busy computer.</p>"
         )
     parts += [
