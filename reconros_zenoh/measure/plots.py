@@ -34,18 +34,18 @@ INK = "#24292f"
 GREY = "#8b949e"
 _MAPPING_COLOURS = ("#d2691e", "#2f7ec4", "#2a9267", "#9463c0", "#c2485a", "#8a7a1f")
 _STAGE_COLOURS = {
-    "transport": "#7a8794",
-    "dds": "#2467ab",
-    "retransmission": "#f0b3c4",
-    "queue": "#d9a520",
-    "dispatch": "#a39228",
-    "reconfiguration": "#b03a50",
-    "execution": "#4fb98b",
-    "memif": "#7a45ab",
-    "osif": "#5cb8c4",
-    "blocked": "#c9d1d9",
-    "hmt": "#9fc46b",
-    "gateway": "#d2691e",
+    "transport": "#73757f",
+    "dds": "#335ba3",
+    "retransmission": "#ecc8da",
+    "queue": "#eba51b",
+    "dispatch": "#987810",
+    "reconfiguration": "#a5453b",
+    "execution": "#7baf8a",
+    "memif": "#802cd9",
+    "osif": "#2fbfee",
+    "blocked": "#158dd5",
+    "hmt": "#a9d469",
+    "gateway": "#df7b5f",
     "overrun": "#24292f",
 }
 _GRID_BINS = 60

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from itertools import pairwise
+from itertools import combinations, pairwise
 from typing import get_args
 from xml.etree import ElementTree as ET
 
@@ -120,16 +120,36 @@ def test_each_stage_has_a_colour_of_its_own():
     assert len(set(plots._STAGE_COLOURS.values())) == len(plots._STAGE_COLOURS)
 
 
-def luminance(colour):
-    """The relative luminance of WCAG 2."""
-    parts = [int(colour[at : at + 2], 16) / 255 for at in (1, 3, 5)]
-    linear = [part / 12.92 if part <= 0.04045 else ((part + 0.055) / 1.055) ** 2.4 for part in parts]
-    return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+# Machado and others (2009): A Physiologically-based Model for Simulation of Colour Vision Deficiency
+SEEN_BY = {
+    "all": np.eye(3),
+    "protanopes": [[0.152, 1.053, -0.205], [0.115, 0.786, 0.099], [-0.004, -0.048, 1.052]],
+    "deuteranopes": [[0.367, 0.861, -0.228], [0.280, 0.673, 0.047], [-0.012, 0.043, 0.969]],
+    "tritanopes": [[1.256, -0.077, -0.179], [-0.078, 0.931, 0.148], [0.005, 0.691, 0.304]],
+}
+XYZ = np.array([[0.4339, 0.3762, 0.1899], [0.2126, 0.7152, 0.0722], [0.0177, 0.1095, 0.8729]])  # of D65
+
+
+def linear(colour):
+    """Red, green and blue, as much light as they are."""
+    parts = np.array([int(colour[at : at + 2], 16) / 255 for at in (1, 3, 5)])
+    return np.where(parts <= 0.04045, parts / 12.92, ((parts + 0.055) / 1.055) ** 2.4)
+
+
+def lab(rgb):
+    """The colour in CIELAB, where distances are about as large as they look."""
+    x, y, z = np.cbrt(XYZ @ np.clip(rgb, 0, 1))
+    return np.array([116 * y - 16, 500 * (x - y), 200 * (y - z)])
 
 
 def test_stages_that_follow_each_other_differ_in_grey():
-    greys = [luminance(colour) + 0.05 for colour in plots._STAGE_COLOURS.values()]
-    assert [max(pair) / min(pair) < 1.15 for pair in pairwise(greys)].count(True) == 0
+    greys = {stage: XYZ[1] @ linear(colour) + 0.05 for stage, colour in plots._STAGE_COLOURS.items()}
+    assert min(max(pair) / min(pair) for pair in pairwise(greys.values())) > 1.3
     # The two that most often take most of the time.
-    dds, execution = (luminance(plots._STAGE_COLOURS[stage]) + 0.05 for stage in ("dds", "execution"))
-    assert execution / dds > 2
+    assert greys["execution"] / greys["dds"] > 2
+
+
+@pytest.mark.parametrize("eyes", SEEN_BY)
+def test_the_colour_blind_can_tell_the_stages_apart(eyes):
+    seen = [lab(np.array(SEEN_BY[eyes]) @ linear(colour)) for colour in plots._STAGE_COLOURS.values()]
+    assert min(np.linalg.norm(one - other) for one, other in combinations(seen, 2)) > 12
