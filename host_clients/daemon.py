@@ -34,7 +34,7 @@ class ClientOptions:
     name: str
     router: str
     requests: int
-    limit_s: float = 10.0  # the modelled stack can take 3 s to repair a large message
+    limit_s: float = 2.0
     wait_s: float = 30.0
     domain: int = 0
     seed: int = 0

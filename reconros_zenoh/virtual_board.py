@@ -71,12 +71,12 @@ class VirtualDesktop:
         requests: tuple[str, str],
         answers: tuple[str, str],
         messages: Iterable[dict[str, Any]],
-        limit_s: float = 10.0,
+        limit_s: float = 2.0,
     ) -> NDArray[np.float64]:
         """Return the time [ms] from each message to its answer; the next leaves when the answer is in.
 
         `requests` and `answers` are topic and type name; a message is given by its fields. An answer that
-        does not come within `limit_s` is NaN; the stack of a board can take 3 s to repair a large message.
+        does not come within `limit_s` is NaN.
         """
         request_type = self.types.message(requests[1])
         publisher = self.desktop.publisher(request_type, requests[0])

@@ -112,7 +112,7 @@ def client(
     limit: Annotated[
         float,
         typer.Option(min=0.001, max=86400, metavar="SECONDS", help="After this time an answer is lost."),
-    ] = 10.0,
+    ] = 2.0,
     wait: Annotated[
         float, typer.Option(min=0.1, max=86400, metavar="SECONDS", help="How long to wait for a board.")
     ] = 30.0,

@@ -55,7 +55,7 @@ def simulate(
     """Run the Compose file of `up` in virtual time, in one process.
 
     The same seed gives the same records, bit for bit. Exit status 0 only if every answer was right and
-    nothing was lost but pictures, which are sent with best effort. Ctrl-C keeps what was measured.
+    nothing was lost. Ctrl-C keeps what was measured.
     """
     plan = read_deployment(file, os.environ).changed(requests, seed)
     with own_folder(out), project_prints(as_json=as_json):
