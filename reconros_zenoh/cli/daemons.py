@@ -111,7 +111,12 @@ def client(
     domain: Domain = 0,
     limit: Annotated[
         float,
-        typer.Option(min=0.001, max=86400, metavar="SECONDS", help="After this time an answer is lost."),
+        typer.Option(
+            min=0.001,
+            max=86400,
+            metavar="SECONDS",
+            help="After this time an answer is lost. A modelled board may need 3 s for a large message.",
+        ),
     ] = 2.0,
     wait: Annotated[
         float, typer.Option(min=0.1, max=86400, metavar="SECONDS", help="How long to wait for a board.")
