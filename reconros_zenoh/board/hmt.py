@@ -31,7 +31,6 @@ if TYPE_CHECKING:
 Policy = Literal["block", "drop"]
 FIFO_DEPTH = 2
 """Of a FIFO whose depth is not declared: one message is worked on while the next comes in."""
-_BACKLOG = 1_000_000
 
 
 def hmt_key(board: str, topic: str) -> str:
@@ -159,7 +158,7 @@ class HardwareTopic:
         self._board = board
         self._overhead_ns = section.overhead.ns if section else 0
         self._ns_per_byte = 1 / section.bandwidth.bytes_per_ns if section else 0.0
-        self._passages: Stream[Streamed] = Stream(self._pass, _BACKLOG)
+        self._passages: Stream[Streamed] = Stream(self._pass, None)
         self._fifos: list[Fifo] = []
         self._tap: Stream[Parts] | None = None
         self.passed = 0
@@ -211,8 +210,7 @@ class HardwareTopic:
         targets = [fifo for fifo in fifos if fifo.reserve()]
         streamed = Streamed(publisher, message, size, targets, timeline, Signal(), sender)
         self._passages.put(streamed)
-        if streamed.complete.callbacks is not None:
-            yield streamed.complete
+        yield streamed.complete
         if self._tap is not None:
             self._tap.put(self.type.encode(message))
 
