@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
@@ -119,7 +118,7 @@ class SoftwareContext:
         locked = mutex.try_lock(self)
         # Asked after it is locked: either this sees that the call is over, or its end sees the mutex.
         if self._is_over:
-            self._release(mutex)
+            mutex.release(self)
             raise CallbackError(f"callback {self._callback} is over its limit: it gets no mutex any more.")
         return locked
 
@@ -147,8 +146,4 @@ class SoftwareContext:
         """Let others have every mutex that is still held: the call has ended, maybe with an error."""
         self._is_over = True
         for mutex in list(self._mutexes):
-            self._release(mutex)
-
-    def _release(self, mutex: Mutex) -> None:
-        with suppress(CallbackError):  # not held, or just given back by its holder in another thread
-            mutex.unlock(self)
+            mutex.release(self)
