@@ -13,8 +13,6 @@ from reconros_zenoh.rmw.received import Received
 from reconros_zenoh.ros.qos import History, QosProfile
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from reconros_zenoh.board.board import Board
     from reconros_zenoh.rmw.node import Node
     from reconros_zenoh.ros.types import ServiceType
@@ -30,8 +28,9 @@ class ClientSource(Reader):
     """A service client: callbacks call with it, and it is ready while a response waits.
 
     Every call ends in one event: its callback gets the response as its message, or None when the server
-    refused, did not answer within `timeout_ns`, or the call was not sent, because of calls that wait to be
-    sent the last 10 are kept. The first None since the last response is logged, `unanswered` counts them.
+    refused or did not answer within `timeout_ns`, `check` refused the response, or the call was not sent,
+    because of calls that wait to be sent the last 10 are kept. The first None since the last response is
+    logged, `unanswered` counts them.
     Responses come in the order in which they arrive and wait however long it takes; each call has a
     `sequence_number`, which stands on the wire as in ROS 2.
     """
@@ -48,7 +47,6 @@ class ClientSource(Reader):
         self._client = node.client(service_type, name)
         self._writer = Writer(board, QosProfile())
         self._timeout_ns = timeout_ns
-        self._check: Callable[[Any], None] | None = None
         self._is_answered = True
         self.unanswered = 0
 
@@ -56,11 +54,6 @@ class ClientSource(Reader):
     def dropped(self) -> int:
         """How many calls were pushed out by newer ones, or could not be sent."""
         return super().dropped + self._writer.dropped
-
-    def open(self, on_ready: Callable[[], None], check: Callable[[Any], None] | None) -> None:
-        """Begin to hand out responses; one that `check` refuses counts as not answered."""
-        self._on_ready = on_ready
-        self._check = check
 
     def request(self, **fields: object) -> Any:
         """Return a request of the service's type with these fields."""

@@ -10,7 +10,7 @@ from collections import deque
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
-from reconros_zenoh.board.endpoints import Event
+from reconros_zenoh.board.endpoints import Event, Source
 from reconros_zenoh.board.stream import Stream
 from reconros_zenoh.clock.activity import Signal
 from reconros_zenoh.errors import BadMessageError, UsageError
@@ -235,15 +235,14 @@ class HardwareTopic:
             fifo.append(streamed)
 
 
-class HmtSource:
+class HmtSource(Source):
     """A hardware callback's subscription to a hardware-mapped topic: ready while a message waits."""
 
     def __init__(self, board: Board, topic: HardwareTopic, plan: FifoPlan) -> None:
+        super().__init__()
         self._board = board
         self._topic = topic
         self._fifo = Fifo(plan, self._arrived, None, cut_through=False)
-        self._on_ready: Callable[[], None] = lambda: None
-        self._check: Callable[[Any], None] | None = None
 
     @property
     def dropped(self) -> int:
@@ -252,8 +251,7 @@ class HmtSource:
 
     def open(self, on_ready: Callable[[], None], check: Callable[[Any], None] | None) -> None:
         """Subscribe."""
-        self._on_ready = on_ready
-        self._check = check
+        super().open(on_ready, check)
         self._topic.subscribe(self._fifo)
 
     def is_ready(self) -> bool:
@@ -266,9 +264,6 @@ class HmtSource:
         timeline = streamed.timeline.fork()
         timeline.mark("hmt")
         return Event(streamed.message, timeline, message_type=self._topic.type, in_slot=True)
-
-    def answer(self, event: Event, response: object) -> None:
-        """Do nothing: what a subscriber's callback returns goes nowhere."""
 
     def _arrived(self) -> None:
         try:
