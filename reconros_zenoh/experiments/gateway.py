@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import statistics
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from importlib.resources import as_file, files
 from itertools import product
 from typing import TYPE_CHECKING, Any, Literal, get_args
@@ -52,10 +52,6 @@ class Times:
     sw_ms: float
     lost: int = 0
 
-    def as_json(self) -> dict[str, Any]:
-        """Return the times under the names of the experiment's JSON."""
-        return {"hw_max_ms": self.hw_max_ms, "sw_ms": self.sw_ms, "lost": self.lost}
-
 
 @dataclass(frozen=True, slots=True)
 class Cell:
@@ -69,15 +65,7 @@ class Cell:
 
     def as_json(self) -> dict[str, Any]:
         """Return the cell under the names of the experiment's JSON."""
-        return {
-            "publisher": self.publisher,
-            "size": self.size,
-            "subscribers": self.subscribers,
-            "smt": self.smt.as_json(),
-            "gateway": self.gateway.as_json(),
-            "speedup_hw": self.speedup_hw,
-            "speedup_sw": self.speedup_sw,
-        }
+        return {**asdict(self), "speedup_hw": self.speedup_hw, "speedup_sw": self.speedup_sw}
 
     @property
     def speedup_hw(self) -> float:
