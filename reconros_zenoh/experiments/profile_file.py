@@ -1,4 +1,4 @@
-"""Writing a board profile with other values, its comments and order kept."""
+"""A board profile with other values: in memory, and as a file whose comments and order are kept."""
 
 from __future__ import annotations
 
@@ -20,6 +20,24 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
 _VALUE = re.compile(r"(\bvalue\s*=\s*)[+-]?[0-9][0-9_.eE+-]*")
+
+
+def varied(profile: Profile, changes: Mapping[tuple[str, ...], float | bool]) -> Profile:
+    """Return the profile with other values at these places of its file, as in ("model", "dds", "jitter").
+
+    A place names a quantity, whose value is replaced, or a switch.
+    """
+    content = profile.model_dump()
+    for place, value in changes.items():
+        *tables, last = place
+        table = content
+        for key in tables:
+            table = table[int(key) if isinstance(table, tuple) else key]
+        if isinstance(table[last], dict):
+            table[last]["value"] = value
+        else:
+            table[last] = value
+    return Profile.model_validate(content)
 
 
 def profile_file(name_or_file: str) -> TomlFile:

@@ -15,8 +15,8 @@ from reconros_zenoh.cli.calibrate import calibrate as command
 from reconros_zenoh.errors import FileError, UsageError
 from reconros_zenoh.experiments.calibration import calibrated_constants
 from reconros_zenoh.experiments.measured import read_measurements
-from reconros_zenoh.experiments.parallel import Run, records_of, varied
-from reconros_zenoh.experiments.profile_file import profile_file, replacing, with_values
+from reconros_zenoh.experiments.parallel import Run, records_of
+from reconros_zenoh.experiments.profile_file import profile_file, replacing, varied, with_values
 from reconros_zenoh.experiments.roundtrip import application_folder
 from reconros_zenoh.project.loader import load_project
 
