@@ -54,13 +54,9 @@ def run_camera(options: CameraOptions, on_ready: Callable[[], None]) -> int:
     with ZenohTransport.open(options.router) as transport:
         start = environment.event()
         camera = Camera(environment, Context(transport, options.domain), TypeRegistry(), options, start)
-        if options.group is None:
-            start.succeed()
-        else:
-            gather(transport, environment, start, options.group, "camera", options.members)
+        gather(transport, environment, start, options.group, "camera", options.members)
         on_ready()
         environment.run(until=camera.done | stop)
-        camera.close()
         return camera.sent
 
 
@@ -96,16 +92,11 @@ def run_viewer(options: ViewerOptions, on_ready: Callable[[str | None], None]) -
                 server.show(picture)
 
         context, types = Context(transport, options.domain), TypeRegistry()
-        nodes = (
-            Viewer(environment, context, types, record("filter", "pictures"), show),
-            Scope(environment, context, types, record("control", "indices")),
-        )
+        Viewer(environment, context, types, record("filter", "pictures"), show)
+        Scope(environment, context, types, record("control", "indices"))
         on_ready(None if server is None else server.url)
-        if options.group is not None:
-            gather(transport, environment, environment.event(), options.group, "viewer", options.members)
+        gather(transport, environment, environment.event(), options.group, "viewer", options.members)
         environment.run(until=stop)
-        for node in nodes:
-            node.close()
     if options.out is not None:
         gallery.write(options.out, options.rate_hz)
     return counts
