@@ -47,10 +47,7 @@ def run_client(options: ClientOptions, on_round_trip: Callable[[RoundTrip], None
 
     Raise TransportError when there is no router, or when no board answers within `wait_s`.
     """
-    keep_time()
-    tune_memory()
-    environment = WallEnvironment()
-    stop = ending_event(environment)
+    environment, stop = begin_process()
     with ZenohTransport.open(options.router) as transport:
         node = Context(transport, options.domain).node(f"{options.name}_client")
         start = environment.event()
@@ -74,6 +71,14 @@ def run_client(options: ClientOptions, on_round_trip: Callable[[RoundTrip], None
         gather(transport, environment, start, options.group, options.name, options.members)
         environment.run(until=loop.done | stop)
         return loop.done.triggered
+
+
+def begin_process() -> tuple[WallEnvironment, simpy.Event]:
+    """Return the event loop of this process, and the event that SIGINT and SIGTERM make happen."""
+    keep_time()
+    tune_memory()
+    environment = WallEnvironment()
+    return environment, ending_event(environment)
 
 
 def gather(
