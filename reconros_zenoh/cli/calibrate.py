@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.text import Text
 
-from reconros_zenoh.board.profile import read_profile
+from reconros_zenoh.board.profile import profile_path, read_profile
 from reconros_zenoh.cli.console import titled_table, wide_console
 from reconros_zenoh.cli.options import AsJson, Seed
 from reconros_zenoh.cli.progress import run_bar
@@ -22,10 +22,11 @@ from reconros_zenoh.experiments.calibration import (
 )
 from reconros_zenoh.experiments.calibration import calibrate as fit
 from reconros_zenoh.experiments.measured import read_measurements
-from reconros_zenoh.experiments.profile_file import profile_file, replacing, with_values
+from reconros_zenoh.experiments.profile_file import replacing, with_values
 from reconros_zenoh.experiments.roundtrip import application
 from reconros_zenoh.measure.compare import grade
 from reconros_zenoh.measure.statistics import format_error, format_ms
+from reconros_zenoh.toml_file import TomlFile
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -74,7 +75,7 @@ def calibrate(
     All other constants are held.
     """
     start = read_profile(profile)
-    source = profile_file(profile)
+    source = TomlFile.read(profile_path(profile))
     constants = calibrated_constants(start)
     project = application()
     measured = read_measurements([*data, *(more_data or [])], project, _assignments(mapping or []), trim=trim)

@@ -5,19 +5,19 @@ from __future__ import annotations
 import re
 import tomllib
 from contextlib import contextmanager
-from importlib.resources import files
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pydantic import ValidationError
 
-from reconros_zenoh.board.profile import Profile, profile_names
+from reconros_zenoh.board.profile import Profile
 from reconros_zenoh.errors import FileError, UsageError
 from reconros_zenoh.experiments.provenance import writing
-from reconros_zenoh.toml_file import TomlFile
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
+    from pathlib import Path
+
+    from reconros_zenoh.toml_file import TomlFile
 
 _VALUE = re.compile(r"(\bvalue\s*=\s*)[+-]?[0-9][0-9_.eE+-]*")
 
@@ -38,13 +38,6 @@ def varied(profile: Profile, changes: Mapping[tuple[str, ...], float | bool]) ->
         else:
             table[last] = value
     return Profile.model_validate(content)
-
-
-def profile_file(name_or_file: str) -> TomlFile:
-    """Return the file of a profile, as `read_profile` finds it."""
-    if name_or_file in profile_names():
-        return TomlFile.read(Path(str(files("reconros_zenoh.board") / "profiles" / f"{name_or_file}.toml")))
-    return TomlFile.read(Path(name_or_file))
 
 
 def with_values(source: TomlFile, values: Mapping[tuple[str, ...], float], profile: Profile) -> str:
