@@ -67,12 +67,15 @@ class StateFolder:
                     f"Stop it first: reconros down -f {self._compose_file}"
                 ) from None
             # Stands until `leave` replaces it, so it tells what is true if that never happens.
-            self._write({}, "The process that ran it was killed.")
+            self.leave({}, "The process that ran it was killed.")
             yield
 
     def leave(self, states: Mapping[str, str], error: str) -> None:
         """Record how the owner, this process, leaves the deployment."""
-        self._write(states, error)
+        record = Record(str(self._compose_file.resolve()), os.getpid(), states, error)
+        new = self._record.with_suffix(".new")
+        new.write_text(json.dumps(asdict(record)), encoding="utf-8")
+        new.replace(self._record)  # at once, so that nobody reads half a record
 
     def end_owner(self) -> Record | None:
         """Stop the deployment if it is running; return its last record and forget it.
@@ -91,12 +94,6 @@ class StateFolder:
             record = _read(self._record)
             self._record.unlink()
             return record
-
-    def _write(self, states: Mapping[str, str], error: str) -> None:
-        record = Record(str(self._compose_file.resolve()), os.getpid(), states, error)
-        new = self._record.with_suffix(".new")
-        new.write_text(json.dumps(asdict(record)), encoding="utf-8")
-        new.replace(self._record)  # at once, so that nobody reads half a record
 
 
 def running(environment: Mapping[str, str]) -> list[Path]:

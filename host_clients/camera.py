@@ -62,10 +62,6 @@ class Camera:
         )
         self.done = environment.process(self._run(start))
 
-    def close(self) -> None:
-        """Take the node out of the graph."""
-        self._node.close()
-
     def _run(self, start: simpy.Event) -> Generator[simpy.Event, object, None]:
         options = self._options
         yield self._matched | self._environment.timeout(round(options.wait_s * _SECOND_NS))

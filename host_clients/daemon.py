@@ -47,10 +47,7 @@ def run_client(options: ClientOptions, on_round_trip: Callable[[RoundTrip], None
 
     Raise TransportError when there is no router, or when no board answers within `wait_s`.
     """
-    keep_time()
-    tune_memory()
-    environment = WallEnvironment()
-    stop = ending_event(environment)
+    environment, stop = begin_process()
     with ZenohTransport.open(options.router) as transport:
         node = Context(transport, options.domain).node(f"{options.name}_client")
         start = environment.event()
@@ -71,24 +68,34 @@ def run_client(options: ClientOptions, on_round_trip: Callable[[RoundTrip], None
                 f"no board answered the {options.name} client within {options.wait_s:g} s. Start one with "
                 f"`reconros board`, with the same --router and --domain."
             )
-        if options.group is not None:
-            gather(transport, environment, start, options.group, options.name, options.members)
-        else:
-            start.succeed()
+        gather(transport, environment, start, options.group, options.name, options.members)
         environment.run(until=loop.done | stop)
-        node.close()
         return loop.done.triggered
+
+
+def begin_process() -> tuple[WallEnvironment, simpy.Event]:
+    """Return the event loop of this process, and the event that SIGINT and SIGTERM make happen."""
+    keep_time()
+    tune_memory()
+    environment = WallEnvironment()
+    return environment, ending_event(environment)
 
 
 def gather(
     transport: Transport,
     environment: WallEnvironment,
     start: simpy.Event,
-    group: str,
+    group: str | None,
     name: str,
     members: int,
 ) -> None:
-    """Let `start` happen once so many members of the group, this one included, have announced themselves."""
+    """Let `start` happen once so many members of the group, this one included, have announced themselves.
+
+    Without a group it happens at once.
+    """
+    if group is None:
+        start.succeed()
+        return
     present: set[str] = set()
 
     def on_change(key: str, alive: bool) -> None:

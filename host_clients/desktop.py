@@ -7,16 +7,14 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from host_clients.camera import Camera
-from host_clients.daemon import gather
+from host_clients.daemon import begin_process, gather
 from host_clients.gallery import Gallery
 from host_clients.picture_server import PictureServer
 from host_clients.scope import Scope
 from host_clients.viewer import Viewer
-from reconros_zenoh.clock.wall import WallEnvironment, ending_event, keep_time
 from reconros_zenoh.measure.record import RecordWriter
 from reconros_zenoh.rmw.node import Context
 from reconros_zenoh.ros.types import TypeRegistry
-from reconros_zenoh.transport.memory import tune_memory
 from reconros_zenoh.transport.zenoh import ZenohTransport
 
 if TYPE_CHECKING:
@@ -24,7 +22,6 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     import numpy as np
-    import simpy
     from numpy.typing import NDArray
 
     from host_clients.camera import CameraOptions
@@ -50,17 +47,13 @@ def run_camera(options: CameraOptions, on_ready: Callable[[], None]) -> int:
     `on_ready` is called when a signal would end it. Raise TransportError when there is no router, or nobody
     subscribes within `wait_s`.
     """
-    environment, stop = _begin()
+    environment, stop = begin_process()
     with ZenohTransport.open(options.router) as transport:
         start = environment.event()
         camera = Camera(environment, Context(transport, options.domain), TypeRegistry(), options, start)
-        if options.group is None:
-            start.succeed()
-        else:
-            gather(transport, environment, start, options.group, "camera", options.members)
+        gather(transport, environment, start, options.group, "camera", options.members)
         on_ready()
         environment.run(until=camera.done | stop)
-        camera.close()
         return camera.sent
 
 
@@ -70,7 +63,7 @@ def run_viewer(options: ViewerOptions, on_ready: Callable[[str | None], None]) -
     `on_ready` gets the address of the page, None without one. Records are filter.csv and control.csv.
     Raise TransportError when there is no router, UsageError when a file cannot be written.
     """
-    environment, stop = _begin()
+    environment, stop = begin_process()
     counts = {"pictures": 0, "indices": 0}
     gallery = Gallery()
     with ExitStack() as closing:
@@ -96,24 +89,11 @@ def run_viewer(options: ViewerOptions, on_ready: Callable[[str | None], None]) -
                 server.show(picture)
 
         context, types = Context(transport, options.domain), TypeRegistry()
-        nodes = (
-            Viewer(environment, context, types, record("filter", "pictures"), show),
-            Scope(environment, context, types, record("control", "indices")),
-        )
+        Viewer(environment, context, types, record("filter", "pictures"), show)
+        Scope(environment, context, types, record("control", "indices"))
         on_ready(None if server is None else server.url)
-        if options.group is not None:
-            gather(transport, environment, environment.event(), options.group, "viewer", options.members)
+        gather(transport, environment, environment.event(), options.group, "viewer", options.members)
         environment.run(until=stop)
-        for node in nodes:
-            node.close()
     if options.out is not None:
         gallery.write(options.out, options.rate_hz)
     return counts
-
-
-def _begin() -> tuple[WallEnvironment, simpy.Event]:
-    """Return an event loop and the event that a signal makes happen."""
-    keep_time()
-    tune_memory()
-    environment = WallEnvironment()
-    return environment, ending_event(environment)

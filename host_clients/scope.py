@@ -48,10 +48,6 @@ class Scope:
         self._node.subscription(word, "/ctrl_out", self._on_ctrl_out, check=check_leg)
         self._node.subscription(word, "/tf_out", self._on_tf_out)
 
-    def close(self) -> None:
-        """Take the node out of the graph."""
-        self._node.close()
-
     def _on_ctrl_out(self, received: Received) -> None:
         self._environment.post(self._command, received.message.data, self._sent_ns(received))
 

@@ -51,10 +51,6 @@ class Viewer:
             types.message("sensor_msgs/msg/Image"), "/image_filtered", self._arrive, check=_check
         )
 
-    def close(self) -> None:
-        """Take the node out of the graph."""
-        self._node.close()
-
     def _arrive(self, received: Received) -> None:
         """Note, on any thread, that a picture has come."""
         self._environment.post(self._show, received.message, self._node.context.clock_ns())

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections import deque
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, cast
 
-from reconros_zenoh.board.endpoints import Event
+from reconros_zenoh.board.endpoints import Event, Source
 from reconros_zenoh.board.spans import Timeline
 from reconros_zenoh.board.stack_node import StackNode
 from reconros_zenoh.errors import BadMessageError, UsageError
@@ -30,7 +29,7 @@ _DEPTH = 10
 _ID_BYTES = 16
 
 
-class ActionSource:
+class ActionSource(Source):
     """An action server: ready while an accepted goal waits; the callback gets its `GoalHandle`.
 
     What the callback returns is the result. When it raises, the goal is aborted. At most 10 goals wait,
@@ -39,19 +38,15 @@ class ActionSource:
     """
 
     def __init__(self, board: Board, node: Node, action_type: ActionType, name: str) -> None:
+        super().__init__()
         self._board = board
         self._node = StackNode(board, node, name)
         self._type = action_type
         self._name = name
-        self._waiting: deque[Event] = deque()
-        self._check: Callable[[Any], None] | None = None
-        self._on_ready: Callable[[], None] = lambda: None
-        self.dropped = 0
 
     def open(self, on_ready: Callable[[], None], check: Callable[[Any], None] | None) -> None:
         """Serve."""
-        self._on_ready = on_ready
-        self._check = check
+        super().open(on_ready, check)
         self._server = ActionServer(self._node, self._type, self._name, self._on_goal, self._accept)
 
     def result(self, **fields: object) -> Any:
@@ -62,14 +57,9 @@ class ActionSource:
         """Return feedback of the action's type with these fields."""
         return self._type.feedback.cls(**fields)
 
-    def is_ready(self) -> bool:
-        """Tell whether a goal waits."""
-        return bool(self._waiting)
-
     def take(self) -> Event:
         """Begin to work on the oldest goal."""
-        event = self._waiting.popleft()
-        event.timeline.mark("queue")
+        event = super().take()
         self._server.execute(event.message)
         return event
 
@@ -79,16 +69,15 @@ class ActionSource:
         self._board.spans.add(event.timeline)
 
     def _accept(self, goal: Any) -> None:
-        if len(self._waiting) >= _DEPTH:
-            self.dropped += 1
+        if len(self._queue) >= _DEPTH:
+            self._dropped += 1
             raise BadMessageError("goal_queue", f"{_DEPTH} goals wait already")
         if self._check is not None:
             self._check(goal)
 
     def _on_goal(self, handle: GoalHandle, received: Received) -> None:
         timeline = cast("Arrived", received).timeline
-        self._waiting.append(Event(handle, timeline, _Failure(self._server, handle), lasting=True))
-        self._on_ready()
+        self.enqueue(Event(handle, timeline, _Failure(self._server, handle), lasting=True))
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,23 +94,17 @@ class _Failure:
         self.server.fail(self.handle)
 
 
-class ActionClientSource:
+class ActionClientSource(Source):
     """An action client: callbacks send goals with it, and it is ready while an `ActionEvent` waits.
 
     Of feedback that nobody takes the last 10 are kept; everything else waits however long it takes.
     """
 
     def __init__(self, board: Board, node: Node, action_type: ActionType, name: str) -> None:
+        super().__init__()
         self._board = board
         self._type = action_type
-        self._waiting: deque[Event] = deque()
-        self._on_ready: Callable[[], None] = lambda: None
         self._client = ActionClient(StackNode(board, node, name), action_type, name, self._on_event)
-        self.dropped = 0
-
-    def open(self, on_ready: Callable[[], None], check: Callable[[Any], None] | None) -> None:  # noqa: ARG002
-        """Begin to hand out events."""
-        self._on_ready = on_ready
 
     def goal(self, **fields: object) -> Any:
         """Return a goal of the action's type with these fields."""
@@ -158,27 +141,11 @@ class ActionClientSource:
         """Ask for a goal to end early; called by the event loop. Raises UsageError for what is no goal id."""
         self._client.cancel(self.checked_id(goal_id))
 
-    def is_ready(self) -> bool:
-        """Tell whether something has happened."""
-        return bool(self._waiting)
-
-    def take(self) -> Event:
-        """Remove the oldest event and return it."""
-        event = self._waiting.popleft()
-        event.timeline.mark("queue")
-        return event
-
-    def answer(self, event: Event, response: object) -> None:
-        """Do nothing: what the callback returns goes nowhere."""
-
     def _on_event(self, happened: ActionEvent) -> None:
         if happened.kind == "feedback":
-            feedback = [
-                place for place, event in enumerate(self._waiting) if event.message.kind == "feedback"
-            ]
+            feedback = [place for place, event in enumerate(self._queue) if event.message.kind == "feedback"]
             if len(feedback) >= _DEPTH:
-                del self._waiting[feedback[0]]
-                self.dropped += 1
+                del self._queue[feedback[0]]
+                self._dropped += 1
         environment = self._board.environment
-        self._waiting.append(Event(happened, Timeline(environment, environment.now)))
-        self._on_ready()
+        self.enqueue(Event(happened, Timeline(environment, environment.now)))

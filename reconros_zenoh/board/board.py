@@ -55,8 +55,8 @@ class SlotPlan:
 class Board:
     """Cores, slots, configuration port, memory interface and communication stack of one board.
 
-    Without a model in its profile (`native`) every part is there and costs nothing. Everything but
-    `Reader.arrive` belongs to the thread of the event loop.
+    Without a model in its profile (`native`) every part is there and costs nothing. What does not say
+    otherwise belongs to the thread of the event loop.
     """
 
     def __init__(

@@ -13,8 +13,6 @@ from reconros_zenoh.rmw.received import Received
 from reconros_zenoh.ros.qos import History, QosProfile
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from reconros_zenoh.board.board import Board
     from reconros_zenoh.rmw.node import Node
     from reconros_zenoh.ros.types import ServiceType
@@ -30,25 +28,17 @@ class ClientSource(Reader):
     """A service client: callbacks call with it, and it is ready while a response waits.
 
     Every call ends in one event: its callback gets the response as its message, or None when the server
-    refused, did not answer within `timeout_ns`, or the call was not sent, because of calls that wait to be
-    sent the last 10 are kept. The first None since the last response is logged, `unanswered` counts them.
+    refused or did not answer within 10 s, `check` refused the response, or the call was not sent,
+    because of calls that wait to be sent the last 10 are kept. The first None since the last response is
+    logged, `unanswered` counts them.
     Responses come in the order in which they arrive and wait however long it takes; each call has a
     `sequence_number`, which stands on the wire as in ROS 2.
     """
 
-    def __init__(
-        self,
-        board: Board,
-        node: Node,
-        service_type: ServiceType,
-        name: str,
-        timeout_ns: int = _ANSWER_NS,
-    ) -> None:
+    def __init__(self, board: Board, node: Node, service_type: ServiceType, name: str) -> None:
         super().__init__(board, service_type.response, QosProfile(history=History.KEEP_ALL))
         self._client = node.client(service_type, name)
         self._writer = Writer(board, QosProfile())
-        self._timeout_ns = timeout_ns
-        self._check: Callable[[Any], None] | None = None
         self._is_answered = True
         self.unanswered = 0
 
@@ -56,11 +46,6 @@ class ClientSource(Reader):
     def dropped(self) -> int:
         """How many calls were pushed out by newer ones, or could not be sent."""
         return super().dropped + self._writer.dropped
-
-    def open(self, on_ready: Callable[[], None], check: Callable[[Any], None] | None) -> None:
-        """Begin to hand out responses; one that `check` refuses counts as not answered."""
-        self._on_ready = on_ready
-        self._check = check
 
     def request(self, **fields: object) -> Any:
         """Return a request of the service's type with these fields."""
@@ -78,7 +63,7 @@ class ClientSource(Reader):
         """Call the service with an encoded request."""
         on_response = partial(self._on_response, sequence_number)
         call = partial(
-            self._client.call_encoded, parts, on_response, self._timeout_ns, sequence_number=sequence_number
+            self._client.call_encoded, parts, on_response, _ANSWER_NS, sequence_number=sequence_number
         )
         unsent = partial(on_response, TransportError(UNSENT))
         self._writer.put(parts, timeline, call, unsent)
@@ -86,16 +71,15 @@ class ClientSource(Reader):
     def _on_response(
         self, sequence_number: int, response: Received | BadMessageError | TransportError
     ) -> None:
-        if isinstance(response, Received):
+        if isinstance(response, Received) and self._check is not None:
             try:
-                if self._check is not None:
-                    self._check(response.message)
+                self._check(response.message)
             except BadMessageError as error:
                 self._client.context.rejections.add(self._client.key, None, error)
-                self._board.environment.post(self._give_up, sequence_number, error)
-            else:
-                self._is_answered = True
-                self.arrive(response)
+                response = error
+        if isinstance(response, Received):
+            self._is_answered = True
+            self.arrive(response)
         else:
             self._board.environment.post(self._give_up, sequence_number, response)
 

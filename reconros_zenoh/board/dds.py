@@ -17,8 +17,6 @@ if TYPE_CHECKING:
     from reconros_zenoh.clock.activity import Awaitable
     from reconros_zenoh.clock.virtual import VirtualEnvironment
 
-# More than any board has under way at once: the queues of readers and writers are the ones that overflow.
-_BACKLOG = 1_000_000
 _TRANSITS_REMEMBERED = 8
 
 
@@ -57,7 +55,8 @@ class DdsStack:
         # How long small and large messages lately were on their way in the real network; nothing in virtual
         # time.
         self._transit_ns = {False: 0.0, True: 0.0}
-        self._passages: Stream[_Passage] = Stream(self._pass, _BACKLOG)
+        # Nothing is pushed out here: the queues of readers and writers are the ones that overflow.
+        self._passages: Stream[_Passage] = Stream(self._pass, None)
         if model is not None:
             dds, link = model.dds, model.link
             self._latency_ns = link.latency.ns
@@ -94,9 +93,7 @@ class DdsStack:
         probability = self._loss_probability_busy if self._cpu.is_busy else self._loss_probability
         yield from self._process(size, self._receive_ns_per_byte)
         timeline.mark("dds")
-        return size <= self._large_from or (
-            yield from self._repair(size, timeline, probability, reliable=reliable)
-        )
+        return not large or (yield from self._repair(size, timeline, probability, reliable=reliable))
 
     def send(self, size: int, timeline: Timeline) -> Generator[Awaitable, object, None]:
         """Return when a message of `size` bytes has gone through the stack and over the link."""
@@ -124,8 +121,7 @@ class DdsStack:
             duration_ns *= self._randomness.lognormvariate(0, self._jitter)
         passage = _Passage(duration_ns, Signal())
         self._passages.put(passage)
-        if passage.done.callbacks is not None:
-            yield passage.done
+        yield passage.done
 
     def _pass(self, passage: _Passage) -> Generator[Awaitable, object, None]:
         yield from self._cpu.run_stack(passage.duration_ns * self._core_share, self._core_share)

@@ -95,8 +95,7 @@ class DelegateCalls:
     def release_mutexes(self) -> None:
         """Let others have every mutex that is still held: the call has ended, maybe with an error."""
         for mutex in self._mutexes:
-            if mutex.is_held_by(self):
-                mutex.unlock(self)
+            mutex.release(self)
 
     def _call(self) -> Generator[Awaitable, object, None]:
         yield from self._osif.call()

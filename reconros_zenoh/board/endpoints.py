@@ -47,27 +47,47 @@ class Event(NamedTuple):
     lasting: bool = False
 
 
-class Source(Protocol):
-    """What makes a callback ready."""
+class Source:
+    """What makes a callback ready: a queue of events, the last `depth` of them (None: all)."""
+
+    def __init__(self, depth: int | None = None) -> None:
+        self._queue: deque[Event] = deque(maxlen=depth)
+        self._dropped = 0
+        self._on_ready: Callable[[], None] = lambda: None
+        self._check: Callable[[Any], None] | None = None
 
     @property
     def dropped(self) -> int:
-        """How many events were pushed out by newer ones before a worker took them."""
+        """How many events were lost, or pushed out by newer ones, before a worker took them."""
+        return self._dropped
 
     def open(self, on_ready: Callable[[], None], check: Callable[[Any], None] | None) -> None:
         """Begin; `on_ready` is called by the event loop whenever an event has come.
 
         `check` raises BadMessageError for a message that the callback cannot use.
         """
+        self._on_ready = on_ready
+        self._check = check
 
     def is_ready(self) -> bool:
         """Tell whether an event waits."""
+        return bool(self._queue)
 
     def take(self) -> Event:
         """Remove the oldest event and return it."""
+        event = self._queue.popleft()
+        event.timeline.mark("queue")
+        return event
 
     def answer(self, event: Event, response: object) -> None:
-        """Pass on what the callback returned."""
+        """Pass on what the callback returned: nowhere, unless a source says otherwise."""
+
+    def enqueue(self, event: Event) -> None:
+        """Append an event; called by the event loop."""
+        if len(self._queue) == self._queue.maxlen:
+            self._dropped += 1
+        self._queue.append(event)
+        self._on_ready()
 
 
 class MessageWriter(Protocol):
@@ -98,7 +118,7 @@ class _Incoming(NamedTuple):
     way: Generator[Awaitable, object, bool]
 
 
-class Reader:
+class Reader(Source):
     """The queue of messages behind the communication stack: base of subscriptions and service servers.
 
     It keeps the last `depth` messages (KEEP_LAST) or all (KEEP_ALL), and counts in `dropped` what it pushed
@@ -106,44 +126,20 @@ class Reader:
     """
 
     def __init__(self, board: Board, message_type: MessageType, qos: QosProfile) -> None:
-        depth = qos.queue_depth
+        super().__init__(qos.queue_depth)
         self._board = board
         self._message_type = message_type
         self._reliable = qos.reliability is Reliability.RELIABLE
-        self._queue: deque[Event] = deque(maxlen=depth)
-        self._stream: Stream[_Incoming] = Stream(self._receive, depth)
-        self._lost = 0
-        self._overwritten = 0
-        self._on_ready: Callable[[], None] = lambda: None
+        self._stream: Stream[_Incoming] = Stream(self._receive, qos.queue_depth)
 
     @property
     def dropped(self) -> int:
         """How many messages were pushed out by newer ones or lost."""
-        return self._overwritten + self._stream.dropped + self._lost
+        return super().dropped + self._stream.dropped
 
     def arrive(self, received: Received) -> None:
         """Accept a message from the transport; callable from any thread."""
         self._board.environment.post(self._enter, received)
-
-    def is_ready(self) -> bool:
-        """Tell whether a message waits."""
-        return bool(self._queue)
-
-    def take(self) -> Event:
-        """Remove the oldest message and return it."""
-        event = self._queue.popleft()
-        event.timeline.mark("queue")
-        return event
-
-    def answer(self, event: Event, response: object) -> None:
-        """Do nothing: what a subscriber's callback returns goes nowhere."""
-
-    def enqueue(self, event: Event) -> None:
-        """Append an event to the queue; called by the event loop."""
-        if len(self._queue) == self._queue.maxlen:
-            self._overwritten += 1
-        self._queue.append(event)
-        self._on_ready()
 
     def _enter(self, received: Received) -> None:
         environment = self._board.environment
@@ -166,7 +162,7 @@ class Reader:
                 )
             )
         else:
-            self._lost += 1
+            self._dropped += 1
 
 
 class SubscriptionSource(Reader):
@@ -190,16 +186,13 @@ class SubscriptionSource(Reader):
         super().__init__(board, message_type, self.qos)
         self.in_hardware = in_hardware
         self._own = own
-        self._check: Callable[[Any], None] | None = None
         self._node = node
-        self._type = message_type
         self._topic = topic
 
     def open(self, on_ready: Callable[[], None], check: Callable[[Any], None] | None) -> None:
         """Subscribe."""
-        self._on_ready = on_ready
-        self._check = check
-        subscription = self._node.subscription(self._type, self._topic, self.arrive, self.qos, check)
+        super().open(on_ready, check)
+        subscription = self._node.subscription(self._message_type, self._topic, self.arrive, self.qos, check)
         if self._board.topics is not None:
             self._board.topics.add_reader(subscription.key, self)
 
@@ -241,7 +234,7 @@ class ServiceSource(Reader):
 
     def open(self, on_ready: Callable[[], None], check: Callable[[Any], None] | None) -> None:
         """Serve."""
-        self._on_ready = on_ready
+        super().open(on_ready, check)
         self._node.service(self._type, self._name, self.arrive, check)
 
     def answer(self, event: Event, response: object) -> None:
@@ -251,7 +244,7 @@ class ServiceSource(Reader):
         self._writer.put(parts, event.timeline, partial(event.responder.respond_encoded, parts))
 
 
-class TimerSource:
+class TimerSource(Source):
     """A periodic timer on the board's clock.
 
     Expiries that nobody took before the next are one, as in rcl; the others count in `dropped`.
@@ -260,39 +253,24 @@ class TimerSource:
     def __init__(self, board: Board, period_ns: int) -> None:
         if period_ns < 1:
             raise UsageError(f"a timer cannot have a period of {period_ns} ns. Give it a longer one.")
+        super().__init__()
         self._board = board
         self._period_ns = period_ns
-        self._expired_ns: int | None = None
-        self.dropped = 0
 
-    def open(self, on_ready: Callable[[], None], check: Callable[[Any], None] | None) -> None:  # noqa: ARG002
+    def open(self, on_ready: Callable[[], None], check: Callable[[Any], None] | None) -> None:
         """Let the first period begin."""
-        self._board.environment.process(self._run(on_ready))
+        super().open(on_ready, check)
+        self._board.environment.process(self._run())
 
-    def is_ready(self) -> bool:
-        """Tell whether the period has expired: `ros_timer_is_ready()`."""
-        return self._expired_ns is not None
-
-    def take(self) -> Event:
-        """Begin to wait for the next expiry."""
-        assert self._expired_ns is not None
-        timeline = Timeline(self._board.environment, self._expired_ns)
-        timeline.mark("queue")
-        self._expired_ns = None
-        return Event(None, timeline)
-
-    def answer(self, event: Event, response: object) -> None:
-        """Do nothing: what a timer's callback returns goes nowhere."""
-
-    def _run(self, on_ready: Callable[[], None]) -> Generator[simpy.Event, object, None]:
+    def _run(self) -> Generator[simpy.Event, object, None]:
         environment = self._board.environment
         while True:
             yield environment.timeout(self._period_ns)
-            if self._expired_ns is None:
-                self._expired_ns = environment.now
+            if self._queue:
+                self._dropped += 1
+                self._on_ready()
             else:
-                self.dropped += 1
-            on_ready()
+                self.enqueue(Event(None, Timeline(environment, environment.now)))
 
 
 class _Outgoing(NamedTuple):

@@ -194,7 +194,7 @@ class Executor:
             SoftwareWorker(self, software_poll_ns) for _ in range(self._software_workers)
         ]
         workers += [HardwareWorker(self, slot, hardware_poll_ns) for slot in self._slots]
-        for entry in self._policy.callbacks:
+        for entry in self._policy:
             self._workers_of[entry.name] = [worker for worker in workers if worker.resource in entry.mask]
             registration = self._registrations[entry.name]
             check = registration.check and partial(_check_message, entry.name, registration.check)

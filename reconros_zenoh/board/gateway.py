@@ -99,8 +99,7 @@ class Gateway:
                 return core.Transferred()
             case core.WriteMemory(streamed):
                 yield from self._board.memif.transfer(streamed.size)
-                if streamed.complete.callbacks is not None:
-                    yield streamed.complete
+                yield streamed.complete
                 streamed.timeline.mark("hmt")
                 return core.Transferred()
             case core.Cancel():
@@ -135,8 +134,7 @@ class Gateway:
         except BadMessageError as error:
             self.refused += 1
             self._board.context.rejections.add(self._topic.key, sender, error)
-        if read.callbacks is not None:
-            yield read
+        yield read
 
     def _read(self, size: int, done: Signal) -> Generator[Awaitable, object, None]:
         yield from self._board.memif.transfer(size)

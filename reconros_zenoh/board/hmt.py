@@ -10,7 +10,7 @@ from collections import deque
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
-from reconros_zenoh.board.endpoints import Event
+from reconros_zenoh.board.endpoints import Event, Source
 from reconros_zenoh.board.stream import Stream
 from reconros_zenoh.clock.activity import Signal
 from reconros_zenoh.errors import BadMessageError, UsageError
@@ -31,7 +31,6 @@ if TYPE_CHECKING:
 Policy = Literal["block", "drop"]
 FIFO_DEPTH = 2
 """Of a FIFO whose depth is not declared: one message is worked on while the next comes in."""
-_BACKLOG = 1_000_000
 
 
 def hmt_key(board: str, topic: str) -> str:
@@ -159,7 +158,7 @@ class HardwareTopic:
         self._board = board
         self._overhead_ns = section.overhead.ns if section else 0
         self._ns_per_byte = 1 / section.bandwidth.bytes_per_ns if section else 0.0
-        self._passages: Stream[Streamed] = Stream(self._pass, _BACKLOG)
+        self._passages: Stream[Streamed] = Stream(self._pass, None)
         self._fifos: list[Fifo] = []
         self._tap: Stream[Parts] | None = None
         self.passed = 0
@@ -211,8 +210,7 @@ class HardwareTopic:
         targets = [fifo for fifo in fifos if fifo.reserve()]
         streamed = Streamed(publisher, message, size, targets, timeline, Signal(), sender)
         self._passages.put(streamed)
-        if streamed.complete.callbacks is not None:
-            yield streamed.complete
+        yield streamed.complete
         if self._tap is not None:
             self._tap.put(self.type.encode(message))
 
@@ -237,15 +235,14 @@ class HardwareTopic:
             fifo.append(streamed)
 
 
-class HmtSource:
+class HmtSource(Source):
     """A hardware callback's subscription to a hardware-mapped topic: ready while a message waits."""
 
     def __init__(self, board: Board, topic: HardwareTopic, plan: FifoPlan) -> None:
+        super().__init__()
         self._board = board
         self._topic = topic
         self._fifo = Fifo(plan, self._arrived, None, cut_through=False)
-        self._on_ready: Callable[[], None] = lambda: None
-        self._check: Callable[[Any], None] | None = None
 
     @property
     def dropped(self) -> int:
@@ -254,8 +251,7 @@ class HmtSource:
 
     def open(self, on_ready: Callable[[], None], check: Callable[[Any], None] | None) -> None:
         """Subscribe."""
-        self._on_ready = on_ready
-        self._check = check
+        super().open(on_ready, check)
         self._topic.subscribe(self._fifo)
 
     def is_ready(self) -> bool:
@@ -268,9 +264,6 @@ class HmtSource:
         timeline = streamed.timeline.fork()
         timeline.mark("hmt")
         return Event(streamed.message, timeline, message_type=self._topic.type, in_slot=True)
-
-    def answer(self, event: Event, response: object) -> None:
-        """Do nothing: what a subscriber's callback returns goes nowhere."""
 
     def _arrived(self) -> None:
         try:

@@ -9,6 +9,7 @@ fitted to its speedups.
 from __future__ import annotations
 
 from collections import defaultdict, deque
+from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from reconros_zenoh.board.endpoints import TopicWriter
@@ -183,7 +184,7 @@ class LocalTopicWriter(TopicWriter):
         self._in_place = in_place
         # The transport keeps what is sent for those who come late elsewhere.
         self._is_kept = qos.durability is Durability.TRANSIENT_LOCAL
-        self._publications: Stream[_Sent] = Stream(self._publish_from_software, qos.queue_depth)
+        self._publications: Stream[_Sent] = Stream(partial(self._publish, hardware=False), qos.queue_depth)
         self.kept: deque[_Publication] = deque(maxlen=qos.depth if self._is_kept else 0)
         topics.add_writer(self)
 
@@ -208,9 +209,6 @@ class LocalTopicWriter(TopicWriter):
         message, parts = self.encode(message)
         yield from self._publish(_Sent(message, parts, timeline.fork()), hardware=True)
         timeline.mark("osif")
-
-    def _publish_from_software(self, sent: _Sent) -> Generator[Awaitable, object, None]:
-        return self._publish(sent, hardware=False)
 
     def _publish(self, sent: _Sent, *, hardware: bool) -> Generator[Awaitable, object, None]:
         received = Received(sent.message, sum(map(len, sent.parts)), 0, publisher=self.gid)

@@ -126,15 +126,17 @@ class Mutex:
 
     def unlock(self, holder: object) -> None:
         """Take the mutex from `holder`; raise CallbackError when it does not hold it."""
+        if not self.release(holder):
+            raise CallbackError("a mutex was unlocked by a callback that does not hold it.")
+
+    def release(self, holder: object) -> bool:
+        """Take the mutex from `holder`; False when it does not hold it."""
         with self._lock:
             if self._holder is not holder:
-                raise CallbackError("a mutex was unlocked by a callback that does not hold it.")
+                return False
             self._holder = None
         self._waiters.tell()
-
-    def is_held_by(self, holder: object) -> bool:
-        """Tell whether `holder` holds the mutex."""
-        return self._holder is holder
+        return True
 
 
 class Condition:

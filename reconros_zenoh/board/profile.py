@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from importlib import resources
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
@@ -24,9 +24,7 @@ from reconros_zenoh.board.quantity import (
 from reconros_zenoh.errors import FileError, UsageError
 from reconros_zenoh.toml_file import TomlFile
 
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
+_FOLDER = Path(str(resources.files("reconros_zenoh.board"))) / "profiles"
 
 _NATIVE_BITSTREAM_SIZE = 4096
 """Where nothing is modelled a bitstream only has to exist."""
@@ -214,8 +212,20 @@ class Profile(_Section):
 
 def profile_names() -> list[str]:
     """Return the names of the profiles that ship."""
-    folder = resources.files("reconros_zenoh.board") / "profiles"
-    return sorted(Path(entry.name).stem for entry in folder.iterdir() if entry.name.endswith(".toml"))
+    return sorted(path.stem for path in _FOLDER.glob("*.toml"))
+
+
+def profile_path(name_or_file: str) -> Path:
+    """Return the file of the shipped profile of that name, or that file; UsageError for an unknown name."""
+    names = profile_names()
+    if name_or_file in names:
+        return _FOLDER / f"{name_or_file}.toml"
+    path = Path(name_or_file)
+    if path.suffix != ".toml":
+        raise UsageError(
+            f"no profile named {name_or_file!r}. Give one of {', '.join(names)} or a .toml file."
+        )
+    return path
 
 
 def read_profile(name_or_file: str) -> Profile:
@@ -223,30 +233,17 @@ def read_profile(name_or_file: str) -> Profile:
 
     Raise FileError with the line for a file that is not a profile, UsageError for an unknown name.
     """
-    path = Path(name_or_file)
-    if name_or_file in profile_names():
-        with resources.as_file(
-            resources.files("reconros_zenoh.board") / "profiles" / f"{name_or_file}.toml"
-        ) as file:
-            return _read(file)
-    if path.suffix != ".toml":
-        raise UsageError(
-            f"no profile named {name_or_file!r}. Give one of {', '.join(profile_names())} or a .toml file."
-        )
-    return _read(path)
-
-
-def _read(path: Path) -> Profile:
+    path = profile_path(name_or_file)
     toml = TomlFile.read(path)
     try:
         return Profile.model_validate(toml.content)
     except ValidationError as error:
         first = error.errors()[0]
         place = [str(key) for key in first["loc"]]
+        key = ".".join(place)
         raise FileError(
-            path, toml.line(place), f"{'.'.join(place)}: {first['msg']}.", _remedy(place)
+            path,
+            toml.line(place),
+            f"{key}: {first['msg']}.",
+            f"Correct {key}; the shipped profiles show every key.",
         ) from None
-
-
-def _remedy(place: Iterable[str]) -> str:
-    return f"Correct {'.'.join(place)}; the shipped profiles show every key."

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import logging
-from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Any, Protocol, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 
 from reconros_zenoh.errors import CallbackError
 
@@ -16,11 +15,11 @@ if TYPE_CHECKING:
     from reconros_zenoh.board.actions import ActionClientSource
     from reconros_zenoh.board.board import Board
     from reconros_zenoh.board.clients import ClientSource
+    from reconros_zenoh.board.endpoints import MessageWriter
     from reconros_zenoh.board.host import Limit
     from reconros_zenoh.board.os_resources import Condition, Mailbox, Mutex, Semaphore
     from reconros_zenoh.board.spans import Timeline
     from reconros_zenoh.board.timing import ExecutionTime
-    from reconros_zenoh.transport.base import Parts
 
 R = TypeVar("R")
 
@@ -35,16 +34,6 @@ class SoftwareImplementation:
     function: SoftwareCallback
     time: ExecutionTime
     limit: Limit | None
-
-
-class Outlet(Protocol):
-    """Where a callback publishes messages."""
-
-    def encode(self, message: object) -> Parts:
-        """Return the message as it goes over the wire; callable from any thread."""
-
-    def send(self, parts: Parts, timeline: Timeline) -> None:
-        """Send an encoded message."""
 
 
 class SoftwareContext:
@@ -82,7 +71,7 @@ class SoftwareContext:
             return kernel(*arguments)
         return self._board.host.compute(kernel, *arguments)
 
-    def publish(self, writer: Outlet, message: object) -> None:
+    def publish(self, writer: MessageWriter, message: object) -> None:
         """Publish the message once the callback has run to completion."""
         self.sends.append(partial(writer.send, writer.encode(message)))
 
@@ -129,7 +118,7 @@ class SoftwareContext:
         locked = mutex.try_lock(self)
         # Asked after it is locked: either this sees that the call is over, or its end sees the mutex.
         if self._is_over:
-            self._release(mutex)
+            mutex.release(self)
             raise CallbackError(f"callback {self._callback} is over its limit: it gets no mutex any more.")
         return locked
 
@@ -157,8 +146,4 @@ class SoftwareContext:
         """Let others have every mutex that is still held: the call has ended, maybe with an error."""
         self._is_over = True
         for mutex in list(self._mutexes):
-            self._release(mutex)
-
-    def _release(self, mutex: Mutex) -> None:
-        with suppress(CallbackError):  # not held, or just given back by its holder in another thread
-            mutex.unlock(self)
+            mutex.release(self)

@@ -64,7 +64,7 @@ class StackNode:
     def publisher(self, message_type: MessageType, topic: str, qos: QosProfile) -> StackPublisher:
         """Return a new publisher."""
         publisher = self._node.publisher(message_type, topic, qos)
-        return StackPublisher(self._board, publisher, qos, self._label)
+        return StackPublisher(publisher, _StackWriter(self._board, qos, self._label))
 
     def subscription(
         self, message_type: MessageType, topic: str, sink: Callable[[Arrived], None], qos: QosProfile
@@ -75,12 +75,11 @@ class StackNode:
 
     def service(self, service_type: ServiceType, name: str, sink: Callable[[Arrived], None]) -> None:
         """Have the requests of a service handed to `sink`."""
-        writer = Writer(self._board, QosProfile())
+        writer = _StackWriter(self._board, QosProfile(), self._label)
 
         def answerable(arrived: Arrived) -> None:
             assert arrived.responder is not None
-            responder = _StackResponder(self._board, writer, arrived.responder, self._label)
-            sink(arrived._replace(responder=responder))
+            sink(arrived._replace(responder=_StackResponder(writer, arrived.responder)))
 
         arrivals = Arrivals(self._board, answerable, QosProfile().depth, self._label)
         self._node.service(service_type, name, arrivals.accept)
@@ -128,17 +127,14 @@ class Arrivals:
 class StackPublisher:
     """A publisher whose messages go through the stack."""
 
-    def __init__(self, board: Board, publisher: Publisher, qos: QosProfile, label: str) -> None:
-        self._board = board
+    def __init__(self, publisher: Publisher, writer: _StackWriter) -> None:
         self._publisher = publisher
-        self._writer = Writer(board, qos)
-        self._label = label
+        self._writer = writer
 
     def publish(self, message: object) -> None:
         """Publish the message; raises UsageError when it is not of the topic's type."""
         parts = self._publisher.message_type.encode(message)
-        send = partial(self._publisher.publish_encoded, parts)
-        self._board.environment.post(_put, self._board, self._writer, parts, send, self._label)
+        self._writer.put(parts, partial(self._publisher.publish_encoded, parts))
 
 
 class StackClient:
@@ -147,7 +143,7 @@ class StackClient:
     def __init__(self, board: Board, client: Client, label: str) -> None:
         self._board = board
         self._client = client
-        self._writer = Writer(board, QosProfile())
+        self._writer = _StackWriter(board, QosProfile(), label)
         self._label = label
 
     def call(
@@ -168,34 +164,37 @@ class StackClient:
 
         send = partial(self._client.call_encoded, parts, on_received, timeout_ns)
         unsent = partial(on_received, TransportError(UNSENT))
-        self._board.environment.post(_put, self._board, self._writer, parts, send, self._label, unsent)
+        self._writer.put(parts, send, unsent)
 
 
 @dataclass(frozen=True, slots=True)
 class _StackResponder:
     """Sends a response through the stack."""
 
-    board: Board
-    writer: Writer
+    writer: _StackWriter
     responder: Responder
-    label: str
 
     def respond_encoded(self, parts: Parts) -> None:
-        send = partial(self.responder.respond_encoded, parts)
-        self.board.environment.post(_put, self.board, self.writer, parts, send, self.label)
+        self.writer.put(parts, partial(self.responder.respond_encoded, parts))
 
     def fail(self, text: str) -> None:
         self.responder.fail(text)
 
 
-def _put(
-    board: Board,
-    writer: Writer,
-    parts: Parts,
-    send: Callable[[], None],
-    label: str,
-    on_dropped: Callable[[], object] = lambda: None,
-) -> None:
-    timeline = Timeline(board.environment, board.environment.now)
-    timeline.callback = label
-    writer.put(parts, timeline, send, on_dropped)
+class _StackWriter:
+    """A `Writer` for any thread, whose messages begin here and are counted under `label`."""
+
+    def __init__(self, board: Board, qos: QosProfile, label: str) -> None:
+        self._environment = board.environment
+        self._writer = Writer(board, qos)
+        self._label = label
+
+    def put(
+        self, parts: Parts, send: Callable[[], None], on_dropped: Callable[[], object] = lambda: None
+    ) -> None:
+        self._environment.post(self._put, parts, send, on_dropped)
+
+    def _put(self, parts: Parts, send: Callable[[], None], on_dropped: Callable[[], object]) -> None:
+        timeline = Timeline(self._environment, self._environment.now)
+        timeline.callback = self._label
+        self._writer.put(parts, timeline, send, on_dropped)

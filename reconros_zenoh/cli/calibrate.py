@@ -7,12 +7,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.box import SIMPLE_HEAD
-from rich.table import Table
 from rich.text import Text
 
-from reconros_zenoh.board.profile import read_profile
-from reconros_zenoh.cli.console import wide_console
+from reconros_zenoh.board.profile import profile_path, read_profile
+from reconros_zenoh.cli.console import titled_table, wide_console
 from reconros_zenoh.cli.options import AsJson, Seed
 from reconros_zenoh.cli.progress import run_bar
 from reconros_zenoh.errors import UsageError
@@ -24,10 +22,11 @@ from reconros_zenoh.experiments.calibration import (
 )
 from reconros_zenoh.experiments.calibration import calibrate as fit
 from reconros_zenoh.experiments.measured import read_measurements
-from reconros_zenoh.experiments.profile_file import profile_file, replacing, with_values
+from reconros_zenoh.experiments.profile_file import replacing, with_values
 from reconros_zenoh.experiments.roundtrip import application
 from reconros_zenoh.measure.compare import grade
 from reconros_zenoh.measure.statistics import format_error, format_ms
+from reconros_zenoh.toml_file import TomlFile
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -76,7 +75,7 @@ def calibrate(
     All other constants are held.
     """
     start = read_profile(profile)
-    source = profile_file(profile)
+    source = TomlFile.read(profile_path(profile))
     constants = calibrated_constants(start)
     project = application()
     measured = read_measurements([*data, *(more_data or [])], project, _assignments(mapping or []), trim=trim)
@@ -142,7 +141,7 @@ def _object(found: Calibration, out: Path, requests: int, seed: int) -> dict[str
 
 
 def _print(console: Console, found: Calibration) -> None:
-    cells = _table("Medians in ms, and the errors of p25, median and p75 after the fit", 2)
+    cells = titled_table("Medians in ms, and the errors of p25, median and p75 after the fit", 1)
     for column in ("mapping", "client", "measured", "before", "after", "p25", "median", "p75"):
         cells.add_column(
             column, overflow="fold", justify="left" if column in {"mapping", "client"} else "right"
@@ -155,7 +154,7 @@ def _print(console: Console, found: Calibration) -> None:
             *_errors(cell),
         )
     console.print(cells)
-    constants = _table("Constants, and how much the objective changes when one is 20 % more or less", 1)
+    constants = titled_table("Constants, and how much the objective changes when one is 20 % more or less")
     for column in ("constant", "unit", "old", "new", "sensitivity", ""):
         constants.add_column(column, justify="left" if column in {"constant", "unit", ""} else "right")
     for each in found.constants:
@@ -188,13 +187,3 @@ def _errors(cell: FittedCell) -> list[Text]:
     errors = [ours / real - 1 for ours, real in zip(cell.after_ms, cell.measured_ms, strict=True)]
     styles = {"good": "green", "fair": "yellow", "bad": "red"}
     return [Text(format_error(error), style=styles[grade(error)]) for error in errors]
-
-
-def _table(title: str, padding: int) -> Table:
-    return Table(
-        title=Text(title, style="bold"),
-        title_justify="left",
-        box=SIMPLE_HEAD,
-        padding=(0, padding - 1, 0, 0),
-        show_edge=False,
-    )

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import typer
+from rich.box import SIMPLE_HEAD
 from rich.console import Console
+from rich.table import Table
+from rich.text import Text
 
 _COLUMNS = 80
 
@@ -17,6 +20,17 @@ def wide_console(columns: int = _COLUMNS) -> Console:
     console = Console()
     console.width = max(console.width, columns)
     return console
+
+
+def titled_table(title: str, padding: int = 0) -> Table:
+    """Return a table without columns under its title, with so many blanks behind each column."""
+    return Table(
+        title=Text(title, style="bold"),
+        title_justify="left",
+        box=SIMPLE_HEAD,
+        padding=(0, padding, 0, 0),
+        show_edge=False,
+    )
 
 
 def interrupted(*, quiet: bool, measured: bool = True) -> typer.Exit:

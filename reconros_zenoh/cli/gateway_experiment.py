@@ -8,11 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.box import SIMPLE_HEAD
-from rich.table import Table
 from rich.text import Text
 
-from reconros_zenoh.cli.console import interrupted, wide_console
+from reconros_zenoh.cli.console import interrupted, titled_table, wide_console
 from reconros_zenoh.cli.options import AsJson, ClockName, Out, Profile
 from reconros_zenoh.cli.progress import run_bar
 from reconros_zenoh.errors import UsageError
@@ -112,13 +110,7 @@ def _write(out: Path, result: dict[str, Any]) -> list[Path]:
 
 def _print(console: Console, result: dict[str, Any]) -> None:
     for publisher in dict.fromkeys(cell["publisher"] for cell in result["cells"]):
-        table = Table(
-            title=Text(f"from {publisher}: ms to the slowest subscriber in HW, and in SW", "bold"),
-            title_justify="left",
-            box=SIMPLE_HEAD,
-            show_edge=False,
-            padding=(0, 1, 0, 0),
-        )
+        table = titled_table(f"from {publisher}: ms to the slowest subscriber in HW, and in SW", 1)
         for column in ("kB", "subscribers", *_to("HW"), *_to("SW")):
             table.add_column(column, justify="right", vertical="bottom", no_wrap=True)
         for cell in result["cells"]:

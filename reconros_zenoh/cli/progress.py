@@ -26,14 +26,7 @@ class ExperimentProgress:
     def __init__(self, plan: Plan, *, quiet: bool) -> None:
         self._plan = plan
         self._console = Console(stderr=True, quiet=quiet)
-        self._bars = Progress(
-            TextColumn("{task.description}"),
-            BarColumn(),
-            MofNCompleteColumn(),
-            TimeElapsedColumn(),
-            console=self._console,
-            disable=quiet or not self._console.is_interactive,
-        )
+        self._bars = _bars(self._console)
         self._tasks = {client: self._bars.add_task(client, total=plan.requests) for client in CLIENTS}
         self._left = 0
         self._mapping = ""
@@ -66,12 +59,17 @@ def run_bar(what: str, runs: int, *, quiet: bool, each: str = "runs") -> Iterato
     console = Console(stderr=True, quiet=quiet)
     if not console.is_interactive:
         console.print(f"{what}: {runs} {each} ...")
-    with Progress(
+    with _bars(console) as bars:
+        yield partial(bars.advance, bars.add_task(what, total=runs))
+
+
+def _bars(console: Console) -> Progress:
+    """Return bars that show nothing where they cannot be redrawn."""
+    return Progress(
         TextColumn("{task.description}"),
         BarColumn(),
         MofNCompleteColumn(),
         TimeElapsedColumn(),
         console=console,
-        disable=quiet or not console.is_interactive,
-    ) as bars:
-        yield partial(bars.advance, bars.add_task(what, total=runs))
+        disable=console.quiet or not console.is_interactive,
+    )

@@ -7,11 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.box import SIMPLE_HEAD
-from rich.table import Table
 from rich.text import Text
 
-from reconros_zenoh.cli.console import interrupted, wide_console
+from reconros_zenoh.cli.console import interrupted, titled_table, wide_console
 from reconros_zenoh.cli.options import AsJson, ClockName, Profile
 from reconros_zenoh.cli.progress import run_bar
 from reconros_zenoh.measure.statistics import format_error, format_ms, format_share
@@ -20,6 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
     from rich.console import Console
+    from rich.table import Table
 
 Clock = Annotated[ClockName, typer.Option(help="Real time on this host, or virtual time.")]
 
@@ -275,9 +274,7 @@ def _print_what_if(console: Console, result: Mapping[str, Any]) -> None:
 
 
 def _table(title: str, columns: Iterable[str]) -> Table:
-    table = Table(
-        title=Text(title, style="bold"), title_justify="left", box=SIMPLE_HEAD, padding=0, show_edge=False
-    )
+    table = titled_table(title)
     for index, column in enumerate(columns):
         # As text: a unit in brackets is no markup.
         table.add_column(Text(column), justify="right" if index else "left", overflow="fold")

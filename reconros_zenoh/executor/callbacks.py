@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import TYPE_CHECKING, NamedTuple, Protocol
@@ -101,8 +102,11 @@ class CallbackList:
         return self._ready & self._matching.get(resource, 0)
 
 
-class CallbackLists:
-    """The four lists of an executor's main thread: timers, subscribers, service servers, service clients."""
+class CallbackLists(ABC):
+    """The four lists of an executor's main thread: timers, subscribers, service servers, service clients.
+
+    Base of both executors, which differ in what they `select`.
+    """
 
     def __init__(self) -> None:
         self._lists = {kind: CallbackList() for kind in CallbackKind}
@@ -116,15 +120,19 @@ class CallbackLists:
             yield from callbacks
 
     def add(self, entry: CallbackEntry) -> None:
-        """Register the entry; raise ValueError when its name is taken."""
+        """Register the entry, before any worker asks; raise ValueError when its name is taken."""
         if entry.name in self._names:
             raise ValueError(f"a callback named {entry.name!r} is registered already")
         self._names.add(entry.name)
         self._lists[entry.kind].append(entry)
 
     def refresh(self, entry: CallbackEntry) -> None:
-        """Note whether the entry could start now."""
+        """Note that an event of the entry has come or gone."""
         self._lists[entry.kind].refresh(entry)
+
+    @abstractmethod
+    def select(self, worker: object, resource: int) -> Dispatch | None:
+        """Return the callback that this worker of `resource` must run now, or None when none is ready."""
 
     def take(self, entry: CallbackEntry, resource: int) -> Dispatch:
         """Take the entry's oldest event and mark it running until `finish`."""

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from reconros_zenoh.executor.callbacks import CallbackKind, CallbackLists, lowest
 
 if TYPE_CHECKING:
-    from reconros_zenoh.executor.callbacks import CallbackEntry, Dispatch
+    from reconros_zenoh.executor.callbacks import Dispatch
 
 _WITH_POSITION = (CallbackKind.SUB, CallbackKind.SRV, CallbackKind.CLT)
 _BEFORE_THE_FIRST = -1
@@ -41,7 +41,7 @@ class OffsetVector:
         return index
 
 
-class ReconrosExecutor:
+class ReconrosExecutor(CallbackLists):
     """Hands ready callbacks to software and hardware workers, whose number it need not know.
 
     A worker asks with `select`, runs what it got to completion, and says so with `finish`. Timers come first,
@@ -51,27 +51,19 @@ class ReconrosExecutor:
     """
 
     def __init__(self) -> None:
-        self.callbacks = CallbackLists()
-        self._timers = self.callbacks[CallbackKind.TMR]
-        self._others = [self.callbacks[kind] for kind in _WITH_POSITION]
+        super().__init__()
+        self._timers = self[CallbackKind.TMR]
+        self._others = [self[kind] for kind in _WITH_POSITION]
         self._offsets: dict[object, OffsetVector] = {}
-
-    def add(self, entry: CallbackEntry) -> None:
-        """Register a callback, before any worker asks; raise ValueError when its name is taken."""
-        self.callbacks.add(entry)
-
-    def refresh(self, entry: CallbackEntry) -> None:
-        """Note that an event of the entry has come or gone."""
-        self.callbacks.refresh(entry)
 
     def select(self, worker: object, resource: int) -> Dispatch | None:
         """Return the callback that this worker of `resource` must run now, or None when none is ready."""
         timers = self._timers.ready(resource)
         if timers:
-            return self.callbacks.take(self._timers[lowest(timers)], resource)
+            return self.take(self._timers[lowest(timers)], resource)
         offsets = self._offsets.get(worker)
         if offsets is None:
-            offsets = self._offsets[worker] = OffsetVector(self.callbacks)
+            offsets = self._offsets[worker] = OffsetVector(self)
         ready = [entries.ready(resource) for entries in self._others]
         if not any(ready):
             offsets.wrap()
@@ -81,9 +73,5 @@ class ReconrosExecutor:
             for kind, entries, bits in zip(_WITH_POSITION, self._others, ready, strict=True):
                 index = offsets.search(kind, bits)
                 if index is not None:
-                    return self.callbacks.take(entries[index], resource)
+                    return self.take(entries[index], resource)
         return None
-
-    def finish(self, dispatch: Dispatch) -> None:
-        """Note that the dispatched callback has run to completion."""
-        self.callbacks.finish(dispatch)

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 from reconros_zenoh.executor.callbacks import CallbackKind, CallbackLists, lowest
 
 if TYPE_CHECKING:
-    from reconros_zenoh.executor.callbacks import CallbackEntry, Dispatch
+    from reconros_zenoh.executor.callbacks import Dispatch
 
 _COLLECTED = (CallbackKind.SUB, CallbackKind.SRV, CallbackKind.CLT)
 
 
-class StandardExecutor:
+class StandardExecutor(CallbackLists):
     """The executor of ROS 2, single-threaded with one worker and multi-threaded with more.
 
     Ready subscribers, service servers and service clients are collected in a `readySet`; it is served in that
@@ -21,39 +21,27 @@ class StandardExecutor:
     """
 
     def __init__(self) -> None:
-        self.callbacks = CallbackLists()
+        super().__init__()
         self._ready_set = dict.fromkeys(_COLLECTED, 0)
-
-    def add(self, entry: CallbackEntry) -> None:
-        """Register a callback; raise ValueError when its name is taken."""
-        self.callbacks.add(entry)
-
-    def refresh(self, entry: CallbackEntry) -> None:
-        """Note that an event of the entry has come or gone."""
-        self.callbacks.refresh(entry)
 
     def select(self, worker: object, resource: int) -> Dispatch | None:  # noqa: ARG002 - every worker is alike
         """Return the callback that a worker must run now, or None when none is ready."""
-        timers = self.callbacks[CallbackKind.TMR].ready(resource)
+        timers = self[CallbackKind.TMR].ready(resource)
         if timers:
-            return self.callbacks.take(self.callbacks[CallbackKind.TMR][lowest(timers)], resource)
+            return self.take(self[CallbackKind.TMR][lowest(timers)], resource)
         return self._from_ready_set(resource) or self._collect_and_select(resource)
-
-    def finish(self, dispatch: Dispatch) -> None:
-        """Note that the dispatched callback has run to completion."""
-        self.callbacks.finish(dispatch)
 
     def _from_ready_set(self, resource: int) -> Dispatch | None:
         for kind in _COLLECTED:
             # What was collected may have gone meanwhile: pushed out by a newer event.
-            serviceable = self._ready_set[kind] & self.callbacks[kind].ready(resource)
+            serviceable = self._ready_set[kind] & self[kind].ready(resource)
             if serviceable:
                 index = lowest(serviceable)
                 self._ready_set[kind] &= ~(1 << index)
-                return self.callbacks.take(self.callbacks[kind][index], resource)
+                return self.take(self[kind][index], resource)
         return None
 
     def _collect_and_select(self, resource: int) -> Dispatch | None:
         for kind in _COLLECTED:
-            self._ready_set[kind] = self.callbacks[kind].ready(resource)
+            self._ready_set[kind] = self[kind].ready(resource)
         return self._from_ready_set(resource)

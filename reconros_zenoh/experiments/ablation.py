@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from reconros_zenoh.experiments.parallel import ParallelRuns, Run, pooled, varied
+from reconros_zenoh.experiments.parallel import ParallelRuns, Run, pooled
+from reconros_zenoh.experiments.profile_file import varied
 from reconros_zenoh.measure.compare import experiment_tables
 
 if TYPE_CHECKING:

@@ -18,7 +18,8 @@ from pydantic import BaseModel
 from reconros_zenoh.board.quantity import Count, Fraction, Quantity, Share
 from reconros_zenoh.errors import UsageError
 from reconros_zenoh.experiments.measured import quartiles_ms
-from reconros_zenoh.experiments.parallel import ParallelRuns, Run, pooled, varied
+from reconros_zenoh.experiments.parallel import ParallelRuns, Run, pooled
+from reconros_zenoh.experiments.profile_file import varied
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence

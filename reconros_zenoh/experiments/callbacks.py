@@ -16,6 +16,7 @@ from reconros_zenoh.clock.virtual import VirtualEnvironment
 from reconros_zenoh.clock.wall import WallEnvironment
 from reconros_zenoh.errors import ExperimentError, UsageError
 from reconros_zenoh.experiments.interruption import until_interrupted
+from reconros_zenoh.experiments.profile_file import varied
 from reconros_zenoh.experiments.provenance import host
 from reconros_zenoh.experiments.roundtrip import application
 from reconros_zenoh.project.mapping_file import CallbackMapping, Mapping
@@ -89,7 +90,14 @@ def measure_callbacks(
             f"profile {profile.name!r} models no board that could be compared. Choose another --profile."
         )
     project = application()
-    quiet = _without_losses(profile, model)
+    # A network that loses nothing: the table is not about waiting for it.
+    quiet = varied(
+        profile,
+        {
+            ("model", "dds", name): 0.0
+            for name in ("nack_probability", "loss_probability", "loss_probability_busy")
+        },
+    )
     table = {}
     overruns = 0
     with until_interrupted() as interruption:
@@ -171,16 +179,6 @@ def _alone(project: Project, callback: str, place: Place) -> Mapping:
         callbacks={name: CallbackMapping() for name in project.callbacks}
         | {callback: CallbackMapping(software=not in_hardware, slots=(slot,) if in_hardware else ())},
     )
-
-
-def _without_losses(profile: Profile, model: Model) -> Profile:
-    """Return the profile with a network that loses nothing: the table is not about waiting for it."""
-    never = {
-        name: getattr(model.dds, name).model_copy(update={"value": 0.0})
-        for name in ("nack_probability", "loss_probability", "loss_probability_busy")
-    }
-    dds = model.dds.model_copy(update=never)
-    return profile.model_copy(update={"model": model.model_copy(update={"dds": dds})})
 
 
 def _row(name: str, hardware: Isolated, software: Isolated, model: Model) -> dict[str, Any]:

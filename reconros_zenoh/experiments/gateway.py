@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import statistics
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from importlib.resources import as_file, files
 from itertools import product
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from board_daemon.hosting import BoardOptions, HostedBoard
 from reconros_zenoh.applications.gateway.nodes import SUBSCRIBERS, random_body, run_nodes
-from reconros_zenoh.board.endpoints import Event
+from reconros_zenoh.board.endpoints import Event, Source
 from reconros_zenoh.board.spans import Timeline
 from reconros_zenoh.clock.virtual import VirtualEnvironment, succeed_once
 from reconros_zenoh.clock.wall import WallEnvironment
@@ -52,10 +52,6 @@ class Times:
     sw_ms: float
     lost: int = 0
 
-    def as_json(self) -> dict[str, Any]:
-        """Return the times under the names of the experiment's JSON."""
-        return {"hw_max_ms": self.hw_max_ms, "sw_ms": self.sw_ms, "lost": self.lost}
-
 
 @dataclass(frozen=True, slots=True)
 class Cell:
@@ -69,15 +65,7 @@ class Cell:
 
     def as_json(self) -> dict[str, Any]:
         """Return the cell under the names of the experiment's JSON."""
-        return {
-            "publisher": self.publisher,
-            "size": self.size,
-            "subscribers": self.subscribers,
-            "smt": self.smt.as_json(),
-            "gateway": self.gateway.as_json(),
-            "speedup_hw": self.speedup_hw,
-            "speedup_sw": self.speedup_sw,
-        }
+        return {**asdict(self), "speedup_hw": self.speedup_hw, "speedup_sw": self.speedup_sw}
 
     @property
     def speedup_hw(self) -> float:
@@ -215,42 +203,27 @@ def _run(
         hosted.close()
 
 
-class _Rounds:
+class _Rounds(Source):
     """Triggers the publisher once everybody has the message before it.
 
     The first message is not timed: it loads the slots.
     """
 
-    dropped = 0
-
     def __init__(self, environment: VirtualEnvironment, count: int, repeat: int) -> None:
+        super().__init__()
         self._environment = environment
         self._readers = count + 1
         self._last = repeat + 1
         self._number = 0
-        self._ready = False
-        self._on_ready: Callable[[], None] = lambda: None
         self._got: dict[str, int] = {}
         self._hw_ns: list[int] = []
         self._sw_ns: list[int] = []
         self.done = environment.event()
 
-    def open(self, on_ready: Callable[[], None], check: Callable[[Any], None] | None) -> None:  # noqa: ARG002 - no message comes
+    def open(self, on_ready: Callable[[], None], check: Callable[[Any], None] | None) -> None:
         """Let the first round begin."""
-        self._on_ready = on_ready
+        super().open(on_ready, check)
         self._begin()
-
-    def is_ready(self) -> bool:
-        """Tell whether the publisher is to publish."""
-        return self._ready
-
-    def take(self) -> Event:
-        """Let the publisher publish."""
-        self._ready = False
-        return Event(None, Timeline(self._environment, self._environment.now))
-
-    def answer(self, event: Event, response: object) -> None:
-        """Do nothing: a publisher's callback returns nothing."""
 
     def note(self, name: str, number: int, transmission_ns: int) -> None:
         """Note when a subscriber had its copy; callable from any thread."""
@@ -264,8 +237,7 @@ class _Rounds:
         self._number += 1
         self._got.clear()
         self._environment.call_later(_LIMIT_NS, self._give_up, self._number)
-        self._ready = True
-        self._on_ready()
+        self.enqueue(Event(None, Timeline(self._environment, self._environment.now)))
 
     def _note(self, name: str, number: int, transmission_ns: int) -> None:
         if number != self._number or name in self._got:

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, NamedTuple, Self
 
 import numpy as np
 
-from reconros_zenoh.board.profile import Profile
 from reconros_zenoh.errors import ExperimentError
 from reconros_zenoh.experiments.roundtrip import CLIENTS
 from reconros_zenoh.experiments.virtual import run_mapping
@@ -22,6 +21,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
     from pathlib import Path
 
+    from reconros_zenoh.board.profile import Profile
     from reconros_zenoh.measure.record import RoundTrip
 
 
@@ -72,24 +72,6 @@ def pooled(records: Sequence[Mapping[str, Record]]) -> dict[str, Record]:
         )
         for client in records[0]
     }
-
-
-def varied(profile: Profile, changes: Mapping[tuple[str, ...], float | bool]) -> Profile:
-    """Return the profile with other values at these places of its file, as in ("model", "dds", "jitter").
-
-    A place names a quantity, whose value is replaced, or a switch.
-    """
-    content = profile.model_dump()
-    for place, value in changes.items():
-        *tables, last = place
-        table = content
-        for key in tables:
-            table = table[int(key) if isinstance(table, tuple) else key]
-        if isinstance(table[last], dict):
-            table[last]["value"] = value
-        else:
-            table[last] = value
-    return Profile.model_validate(content)
 
 
 def _begin_process() -> None:

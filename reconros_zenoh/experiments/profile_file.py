@@ -1,32 +1,43 @@
-"""Writing a board profile with other values, its comments and order kept."""
+"""A board profile with other values: in memory, and as a file whose comments and order are kept."""
 
 from __future__ import annotations
 
 import re
 import tomllib
 from contextlib import contextmanager
-from importlib.resources import files
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pydantic import ValidationError
 
-from reconros_zenoh.board.profile import Profile, profile_names
+from reconros_zenoh.board.profile import Profile
 from reconros_zenoh.errors import FileError, UsageError
 from reconros_zenoh.experiments.provenance import writing
-from reconros_zenoh.toml_file import TomlFile
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
+    from pathlib import Path
+
+    from reconros_zenoh.toml_file import TomlFile
 
 _VALUE = re.compile(r"(\bvalue\s*=\s*)[+-]?[0-9][0-9_.eE+-]*")
 
 
-def profile_file(name_or_file: str) -> TomlFile:
-    """Return the file of a profile, as `read_profile` finds it."""
-    if name_or_file in profile_names():
-        return TomlFile.read(Path(str(files("reconros_zenoh.board") / "profiles" / f"{name_or_file}.toml")))
-    return TomlFile.read(Path(name_or_file))
+def varied(profile: Profile, changes: Mapping[tuple[str, ...], float | bool]) -> Profile:
+    """Return the profile with other values at these places of its file, as in ("model", "dds", "jitter").
+
+    A place names a quantity, whose value is replaced, or a switch.
+    """
+    content = profile.model_dump()
+    for place, value in changes.items():
+        *tables, last = place
+        table = content
+        for key in tables:
+            table = table[int(key) if isinstance(table, tuple) else key]
+        if isinstance(table[last], dict):
+            table[last]["value"] = value
+        else:
+            table[last] = value
+    return Profile.model_validate(content)
 
 
 def with_values(source: TomlFile, values: Mapping[tuple[str, ...], float], profile: Profile) -> str:

@@ -83,21 +83,11 @@ class Application:
             case "rossub":
                 return self._subscription(resource, qos)
             case "rossrvs":
-                return ServiceSource(
-                    self.board,
-                    self._node(resource),
-                    self._type(resource, self.types.service),
-                    self._ros_name(resource),
-                )
+                return ServiceSource(self.board, *self._end(resource, self.types.service))
             case "rossrvc":
                 return self.client(group, name)
             case "rosactions":
-                return ActionSource(
-                    self.board,
-                    self._node(resource),
-                    self._type(resource, self.types.action),
-                    self._ros_name(resource),
-                )
+                return ActionSource(self.board, *self._end(resource, self.types.action))
             case "rosactionc":
                 return self.action_client(group, name)
             case "rostmr":
@@ -109,27 +99,13 @@ class Application:
     def _subscription(self, resource: Resource, qos: QosProfile | None) -> Source:
         if resource.hardware_mapped:
             return HmtSource(self.board, self._hardware_topic(resource), resource.fifo)
-        return SubscriptionSource(
-            self.board,
-            self._node(resource),
-            self._type(resource, self.types.message),
-            self._ros_name(resource),
-            qos,
-            in_hardware=self._in_hardware(resource),
-        )
+        end = self._end(resource, self.types.message)
+        return SubscriptionSource(self.board, *end, qos, in_hardware=self._in_hardware(resource))
 
     def client(self, group: str, name: str) -> ClientSource:
         """Return the service client of that name, the same one each time."""
         return self._shared(
-            group,
-            name,
-            "rossrvc",
-            lambda resource: ClientSource(
-                self.board,
-                self._node(resource),
-                self._type(resource, self.types.service),
-                self._ros_name(resource),
-            ),
+            group, name, "rossrvc", lambda r: ClientSource(self.board, *self._end(r, self.types.service))
         )
 
     def action_client(self, group: str, name: str) -> ActionClientSource:
@@ -138,12 +114,7 @@ class Application:
             group,
             name,
             "rosactionc",
-            lambda resource: ActionClientSource(
-                self.board,
-                self._node(resource),
-                self._type(resource, self.types.action),
-                self._ros_name(resource),
-            ),
+            lambda r: ActionClientSource(self.board, *self._end(r, self.types.action)),
         )
 
     def writer(self, group: str, name: str, qos: QosProfile | None = None) -> MessageWriter:
@@ -152,12 +123,7 @@ class Application:
         if resource.hardware_mapped:
             _refuse_qos(resource, qos)
             return HmtWriter(self._hardware_topic(resource))
-        return self.board.writer(
-            self._node(resource),
-            self._type(resource, self.types.message),
-            _required(resource.ros_name),
-            qos,
-        )
+        return self.board.writer(*self._end(resource, self.types.message), qos)
 
     def mbox(self, group: str, name: str) -> Mailbox:
         """Return the mailbox of that name, the same one each time."""
@@ -194,7 +160,7 @@ class Application:
         """Return the parameters of the node (a rosnode) of that name, the same ones each time."""
 
         def serve(resource: Resource) -> Parameters:
-            node = self._node_named(_required(resource.ros_name))
+            node = self._node(_required(resource.ros_name))
             return Parameters(StackNode(self.board, node, node.name), self.types)
 
         return self._shared(group, name, "rosnode", serve)
@@ -286,10 +252,10 @@ class Application:
         except UsageError as error:
             raise FileError(self.project.configuration.path, end.line, f"{end.name}: {error}") from error
 
-    def _ros_name(self, end: Resource) -> str:
-        """Return the name of an end as written; raise FileError with its line for one that cannot be."""
+    def _end(self, end: Resource, find: Callable[[str], T]) -> tuple[Node, T, str]:
+        """Return node, type and name, as written, of an end; raise FileError for what cannot be."""
         endpoint_name(self.project.configuration.path, end)
-        return _required(end.ros_name)
+        return self._node(_required(end.node)), self._type(end, find), _required(end.ros_name)
 
     def _shared(self, group: str, name: str, kind: str, make: Callable[[Resource], T]) -> T:
         if (group, name) not in self._made:
@@ -332,10 +298,7 @@ class Application:
             self._type(resource, self.types.message),
         )
 
-    def _node(self, resource: Resource) -> Node:
-        return self._node_named(_required(resource.node))
-
-    def _node_named(self, name: str) -> Node:
+    def _node(self, name: str) -> Node:
         if name not in self._nodes:
             namespace, _, base = name.rpartition("/")
             self._nodes[name] = self.board.context.node(base, namespace or "/")

@@ -33,7 +33,7 @@ class Client(Endpoint):
         super().__init__(node, EndpointKind.CLIENT, name, service_type, qos)
         self.service_type = service_type
         self._querier = self.context.transport.request(self.key, on_matching)
-        self.announce()
+        self.announce(self._querier)
 
     def call(
         self,
@@ -80,11 +80,6 @@ class Client(Endpoint):
             if not answered:  # Zenoh may say that the request is over, and then that it cannot be sent
                 answered = True
                 raise
-
-    def close(self) -> None:
-        """Withdraw the client; a call that still waits is not heard of any more. Idempotent."""
-        self.withdraw()
-        self._querier.close()
 
     def _result(self, reply: Reply | None, number: int) -> Received | BadMessageError | TransportError:
         if reply is None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-from abc import ABC, abstractmethod
 from typing import TYPE_CHECKING
 
 from reconros_zenoh.ros.attachment import Attachment
@@ -15,9 +14,10 @@ if TYPE_CHECKING:
     from reconros_zenoh.ros.graph import EndpointKind
     from reconros_zenoh.ros.qos import QosProfile
     from reconros_zenoh.ros.types import MessageType, ServiceType
+    from reconros_zenoh.transport.base import Declaration
 
 
-class Endpoint(ABC):
+class Endpoint:
     """One end of a topic or service, announced in the ROS graph until it is closed."""
 
     def __init__(
@@ -44,19 +44,17 @@ class Endpoint(ABC):
         self.gid = gid(self._token_key)
         self._sequence_numbers = itertools.count(1)
 
-    def announce(self) -> None:
+    def announce(self, declaration: Declaration) -> None:
         """Make the endpoint visible in the graph, once it works; from then on its node closes it, too."""
+        self._declaration = declaration
         self._token = self.context.transport.declare_token(self._token_key)
         self._node.endpoints[self] = None
 
-    def withdraw(self) -> None:
-        """Take the endpoint out of the graph, and from its node."""
+    def close(self) -> None:
+        """Take it out of the graph and end it for good; its callbacks are not called any more. Idempotent."""
         self._node.endpoints.pop(self, None)
         self._token.close()
-
-    @abstractmethod
-    def close(self) -> None:
-        """End it for good; idempotent."""
+        self._declaration.close()
 
     def next_sequence_number(self) -> int:
         """Return the number of the endpoint's next message; callable from any thread."""

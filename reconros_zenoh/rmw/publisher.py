@@ -30,7 +30,7 @@ class Publisher(Endpoint):
         super().__init__(node, EndpointKind.PUBLISHER, topic, message_type, qos)
         self.message_type = message_type
         self._publisher = self.context.transport.publish(self.key, qos, on_matching)
-        self.announce()
+        self.announce(self._publisher)
 
     def publish(self, message: object) -> None:
         """Publish the message."""
@@ -39,8 +39,3 @@ class Publisher(Endpoint):
     def publish_encoded(self, parts: Parts) -> None:
         """Publish a message that is encoded already, as `message_type.encode` does."""
         self._publisher.put(parts, self.attachment(self.next_sequence_number()))
-
-    def close(self) -> None:
-        """Withdraw the publisher; idempotent."""
-        self.withdraw()
-        self._publisher.close()

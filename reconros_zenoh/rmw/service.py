@@ -55,13 +55,7 @@ class Service(Endpoint):
         self.service_type = service_type
         self._sink = sink
         self._check = check
-        self._server = self.context.transport.serve(self.key, self._on_request)
-        self.announce()
-
-    def close(self) -> None:
-        """End the service; `sink` is not called any more. Idempotent."""
-        self.withdraw()
-        self._server.close()
+        self.announce(self.context.transport.serve(self.key, self._on_request))
 
     def _on_request(self, request: Request) -> None:
         sender = None

@@ -42,15 +42,8 @@ class Subscription(Endpoint):
         self._sink = sink
         self._check = check
         middle = self.key.split("/")[1:-1]
-        self._subscription = self.context.transport.subscribe(
-            "/".join(("*", *middle, "*")), self._on_sample, qos, self.key
-        )
-        self.announce()
-
-    def close(self) -> None:
-        """End the subscription; `sink` is not called any more. Idempotent."""
-        self.withdraw()
-        self._subscription.close()
+        expression = "/".join(("*", *middle, "*"))
+        self.announce(self.context.transport.subscribe(expression, self._on_sample, qos, self.key))
 
     def _on_sample(self, sample: Sample) -> None:
         key, attachment, payload = sample

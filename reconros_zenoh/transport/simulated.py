@@ -6,11 +6,13 @@ What a link costs is not here: the board's network interface charges it.
 from __future__ import annotations
 
 from collections import deque
-from typing import TYPE_CHECKING
+from functools import partial
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from reconros_zenoh.errors import TransportError
 from reconros_zenoh.ros.qos import Durability
 from reconros_zenoh.transport.base import Reply, Sample
+from reconros_zenoh.transport.changes import MatchingChanges
 from reconros_zenoh.transport.guard import Closing, GuardedDeclaration
 from reconros_zenoh.transport.key_expressions import check_concrete, check_key, intersects
 
@@ -31,10 +33,8 @@ class SimulatedNetwork:
     def __init__(self, environment: VirtualEnvironment) -> None:
         self.environment = environment
         # Dictionaries serve as sets that keep the order in which things were declared.
-        self.publishers: dict[_Publisher, None] = {}
-        self.subscriptions: dict[_Subscription, None] = {}
-        self.queriers: dict[_Querier, None] = {}
-        self.servers: dict[_Server, None] = {}
+        self.topics: _Ends[_Publisher] = _Ends()
+        self.services: _Ends[_Querier] = _Ends()
         self.tokens: dict[_Token, None] = {}
         self.watches: dict[_Watch, None] = {}
 
@@ -66,18 +66,23 @@ class SimulatedTransport(Closing):
         sink: Callable[[Sample], None],
         qos: QosProfile,
         usual_key: str | None = None,  # noqa: ARG002 # all keys cost the same
-    ) -> _Subscription:
+    ) -> _Receiver:
         """Declare a subscription, see `Transport.subscribe`."""
-        return _Subscription(self._enter(key), key, sink, qos)
+        subscription = _Receiver(self._enter(key), key, self._network.topics, sink)
+        if qos.durability is Durability.TRANSIENT_LOCAL:
+            for publisher in subscription.senders():
+                for sample in list(publisher.cache)[-qos.depth :]:
+                    subscription.post(sink, sample)
+        return subscription
 
-    def serve(self, key: str, sink: Callable[[Request], None]) -> _Server:
+    def serve(self, key: str, sink: Callable[[Request], None]) -> _Receiver:
         """Declare a server, see `Transport.serve`."""
-        return _Server(self._enter(key), key, sink)
+        return _Receiver(self._enter(key), key, self._network.services, sink)
 
     def request(self, key: str, on_matching: OnMatching | None = None) -> _Querier:
         """Declare a querier, see `Transport.request`."""
         check_concrete(key)
-        return _Querier(self._enter(key), key, on_matching)
+        return _Querier(self._enter(key), key, self._network.services, on_matching)
 
     def declare_token(self, key: str) -> _Token:
         """Declare a liveliness token."""
@@ -106,6 +111,7 @@ class SimulatedTransport(Closing):
 
 
 _Home = tuple[SimulatedNetwork, "dict[_Declaration, None]"]
+_S = TypeVar("_S", bound="_Sender")
 
 
 class _Declaration(GuardedDeclaration):
@@ -127,77 +133,79 @@ class _Declaration(GuardedDeclaration):
         self.network.environment.post(self.call, callback, *arguments)
 
 
-class _Matcher(_Declaration):
-    """A publisher or querier: keeps its route, and tells when it gets its first and loses its last."""
+class _Ends(Generic[_S]):
+    """Publishers and subscriptions, or queriers and servers, in the order in which they were declared."""
 
-    __slots__ = ("_matched", "_on_matching")
+    def __init__(self) -> None:
+        self.senders: dict[_S, None] = {}
+        self.receivers: dict[_Receiver, None] = {}
 
-    def __init__(self, home: _Home, key: str, on_matching: OnMatching | None) -> None:
+
+class _Sender(_Declaration):
+    """A publisher or querier: knows its receivers, and tells when it gets its first and loses its last."""
+
+    __slots__ = ("_ends", "_matching", "_route")
+
+    def __init__(self, home: _Home, key: str, ends: _Ends[Any], on_matching: OnMatching | None) -> None:
         super().__init__(home, key)
-        self._on_matching = on_matching
-        self._matched: bool | None = None
-
-    def tell_matching(self, matched: bool) -> None:
-        """Report whether there is a counterpart, if that is news."""
-        if matched is not self._matched:
-            self._matched = matched
-            if self._on_matching is not None:
-                self.post(self._on_matching, matched)
-
-
-class _Publisher(_Matcher):
-    __slots__ = ("_route", "cache")
-
-    def __init__(self, home: _Home, key: str, qos: QosProfile, on_matching: OnMatching | None) -> None:
-        super().__init__(home, key, on_matching)
-        transient = qos.durability is Durability.TRANSIENT_LOCAL
-        self.cache: deque[Sample] | None = deque(maxlen=qos.depth) if transient else None
-        self._route: tuple[_Subscription, ...] = ()
-        self.network.publishers[self] = None
+        self._ends = ends
+        self._matching = MatchingChanges(partial(self.post, on_matching) if on_matching else lambda _: None)
+        self._route: tuple[_Receiver, ...] = ()
+        ends.senders[self] = None
         self.find_route()
 
     def find_route(self) -> None:
-        """Know the present subscriptions of this key."""
-        self._route = tuple(s for s in self.network.subscriptions if intersects(s.key, self.key))
-        self.tell_matching(bool(self._route))
+        """Know the present receivers of this key."""
+        self._route = tuple(each for each in self._ends.receivers if intersects(each.key, self.key))
+        self._matching.report(bool(self._route))
+
+    def withdraw(self) -> None:
+        super().withdraw()
+        del self._ends.senders[self]
+
+
+class _Receiver(_Declaration):
+    """A subscription or server; what is sent to it is posted to `sink`."""
+
+    __slots__ = ("_ends", "sink")
+
+    def __init__(self, home: _Home, key: str, ends: _Ends[Any], sink: Callable[[Any], None]) -> None:
+        super().__init__(home, key)
+        self.sink = sink
+        self._ends = ends
+        ends.receivers[self] = None
+        self._tell_senders()
+
+    def senders(self) -> list[Any]:
+        """Return those who send on a key of this one."""
+        return [each for each in self._ends.senders if intersects(each.key, self.key)]
+
+    def _tell_senders(self) -> None:
+        for sender in self.senders():
+            sender.find_route()
+
+    def withdraw(self) -> None:
+        super().withdraw()
+        del self._ends.receivers[self]
+        self._tell_senders()
+
+
+class _Publisher(_Sender):
+    __slots__ = ("cache",)
+
+    def __init__(self, home: _Home, key: str, qos: QosProfile, on_matching: OnMatching | None) -> None:
+        super().__init__(home, key, home[0].topics, on_matching)
+        transient = qos.durability is Durability.TRANSIENT_LOCAL
+        self.cache: deque[Sample] = deque(maxlen=qos.depth if transient else 0)
 
     def put(self, parts: Parts, attachment: bytes | None) -> None:
         self.check_open()
-        if not self._route and self.cache is None:
+        if not self._route and not self.cache.maxlen:
             return
         sample = Sample(self.key, attachment, _payload(parts))
-        if self.cache is not None:
-            self.cache.append(sample)
+        self.cache.append(sample)
         for subscription in self._route:
             subscription.post(subscription.sink, sample)
-
-    def withdraw(self) -> None:
-        super().withdraw()
-        del self.network.publishers[self]
-
-
-class _Subscription(_Declaration):
-    __slots__ = ("sink",)
-
-    def __init__(self, home: _Home, key: str, sink: Callable[[Sample], None], qos: QosProfile) -> None:
-        super().__init__(home, key)
-        self.sink = sink
-        self.network.subscriptions[self] = None
-        for publisher in self._tell_publishers():
-            if qos.durability is Durability.TRANSIENT_LOCAL and publisher.cache is not None:
-                for sample in list(publisher.cache)[-qos.depth :]:
-                    self.post(sink, sample)
-
-    def _tell_publishers(self) -> list[_Publisher]:
-        publishers = [p for p in self.network.publishers if intersects(p.key, self.key)]
-        for publisher in publishers:
-            publisher.find_route()
-        return publishers
-
-    def withdraw(self) -> None:
-        super().withdraw()
-        del self.network.subscriptions[self]
-        self._tell_publishers()
 
 
 class _Exchange:
@@ -260,19 +268,8 @@ class _Request:
             self._exchange.post_answer(None)
 
 
-class _Querier(_Matcher):
-    __slots__ = ("_route",)
-
-    def __init__(self, home: _Home, key: str, on_matching: OnMatching | None) -> None:
-        super().__init__(home, key, on_matching)
-        self._route: tuple[_Server, ...] = ()
-        self.network.queriers[self] = None
-        self.find_route()
-
-    def find_route(self) -> None:
-        """Know the present servers of this key."""
-        self._route = tuple(s for s in self.network.servers if intersects(s.key, self.key))
-        self.tell_matching(bool(self._route))
+class _Querier(_Sender):
+    __slots__ = ()
 
     def get(self, parts: Parts, attachment: bytes | None, on_reply: OnReply, timeout_ns: int) -> None:
         self.check_open()
@@ -281,30 +278,6 @@ class _Querier(_Matcher):
             server.post(server.sink, _Request(self.key, attachment, parts, exchange))
         # Without a server it is over at once, but never from within this call.
         self.network.environment.call_later(timeout_ns if self._route else 0, exchange.finish)
-
-    def withdraw(self) -> None:
-        super().withdraw()
-        del self.network.queriers[self]
-
-
-class _Server(_Declaration):
-    __slots__ = ("sink",)
-
-    def __init__(self, home: _Home, key: str, sink: Callable[[Request], None]) -> None:
-        super().__init__(home, key)
-        self.sink = sink
-        self.network.servers[self] = None
-        self._tell_queriers()
-
-    def _tell_queriers(self) -> None:
-        for querier in self.network.queriers:
-            if intersects(querier.key, self.key):
-                querier.find_route()
-
-    def withdraw(self) -> None:
-        super().withdraw()
-        del self.network.servers[self]
-        self._tell_queriers()
 
 
 class _Token(_Declaration):

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 from table import arguments, print_result
 
 from reconros_zenoh.board.board import Board
-from reconros_zenoh.board.endpoints import Event
+from reconros_zenoh.board.endpoints import Event, Source
 from reconros_zenoh.board.executor import Executor
 from reconros_zenoh.board.profile import read_profile
 from reconros_zenoh.board.spans import Timeline
@@ -38,19 +38,13 @@ FLAT = 1.5
 LIMIT_S = 60.0
 
 
-class Bell:
+class Bell(Source):
     """A source that becomes ready when it is rung."""
 
-    dropped = 0
-
     def __init__(self, environment: WallEnvironment) -> None:
+        super().__init__()
         self._environment = environment
         self._rings = 0
-        self._on_ready: Callable[[], None] = lambda: None
-
-    def open(self, on_ready: Callable[[], None], _: object) -> None:
-        """Begin."""
-        self._on_ready = on_ready
 
     def ring(self, times: int = 1) -> int:
         """Become ready and return when that was [ns]; called by the event loop."""
@@ -67,9 +61,6 @@ class Bell:
         """Take one ring."""
         self._rings -= 1
         return Event(None, Timeline(self._environment, self._environment.now))
-
-    def answer(self, event: Event, response: object) -> None:
-        """Do nothing."""
 
 
 class BusyBoard:

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections import deque
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
 from reconros_zenoh.board.board import Board, SlotPlan
-from reconros_zenoh.board.endpoints import Event
+from reconros_zenoh.board.endpoints import Event, Source
 from reconros_zenoh.board.profile import Profile
 from reconros_zenoh.board.spans import Timeline
 from reconros_zenoh.clock.activity import Activity
@@ -159,40 +158,25 @@ def desktop(board: Board) -> Context:
     return Context(network.transport("c0"), 0, board.environment.clock_ns)
 
 
-class Tickets:
+class Tickets(Source):
     """A source that a test fills by hand, without any communication."""
 
-    dropped = 0
-
     def __init__(self, board: Board) -> None:
+        super().__init__()
         self._environment = board.environment
-        self._waiting: deque[Event] = deque()
-        self._on_ready: Callable[[], None] = lambda: None
         self.timelines: list[Timeline] = []
         self.answers: list[tuple[object, object]] = []
         self.on_answer: Callable[[], object] = lambda: None
 
-    def open(self, on_ready: Callable[[], None], check: Callable[[Any], None] | None) -> None:
-        self._on_ready = on_ready
-
     def put(self, message: object) -> None:
         timeline = Timeline(self._environment, self._environment.now)
         self.timelines.append(timeline)
-        self._waiting.append(Event(message, timeline))
-        self._on_ready()
+        self.enqueue(Event(message, timeline))
 
     def put_at(self, *times_ns: int) -> None:
         """Put a ticket at each of these times; the message is the time."""
         for time_ns in times_ns:
             self._environment.call_later(time_ns - self._environment.now, self.put, time_ns)
-
-    def is_ready(self) -> bool:
-        return bool(self._waiting)
-
-    def take(self) -> Event:
-        event = self._waiting.popleft()
-        event.timeline.mark("queue")
-        return event
 
     def answer(self, event: Event, response: object) -> None:
         self.answers.append((event.message, response))

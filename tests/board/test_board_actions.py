@@ -265,10 +265,10 @@ def test_old_feedback_makes_room_and_nothing_else_does() -> None:
     for place in range(14):
         case.handles[0].feedback(FIBONACCI.feedback.cls(sequence=fibonacci(place)))
         case.board.environment.run(until=case.board.environment.now + 10_000)
-    waiting = [event.message.kind for event in case.client._waiting]
+    waiting = [event.message.kind for event in case.client._queue]
     assert (waiting.count("feedback"), waiting.count("accepted")) == (10, 1)
     assert case.client.dropped == 4
-    last = [event.message.message for event in case.client._waiting if event.message.kind == "feedback"]
+    last = [event.message.message for event in case.client._queue if event.message.kind == "feedback"]
     assert len(last[-1].sequence) == 13
 
 

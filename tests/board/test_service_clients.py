@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 SET_BOOL = types().service("std_srvs/srv/SetBool")
 CALLBACKS = {"ask": (100, 100), "hear": (50, 50)}
-SECOND_NS = 10**9
+ANSWER_NS = 10**10
 
 
 class Asking:
@@ -39,7 +39,7 @@ class Asking:
         **options: Any,
     ) -> None:
         self.board = small_board(small_profile(CALLBACKS, link_ns=1000, osif_ns=7, **options), 2)
-        self.client = ClientSource(self.board, self.board.context.node("client"), SET_BOOL, "set", SECOND_NS)
+        self.client = ClientSource(self.board, self.board.context.node("client"), SET_BOOL, "set")
         self.executor = Executor(self.board, 1, 2)
         self.tickets = Tickets(self.board)
         self.heard: list[tuple[int, Any]] = []
@@ -83,7 +83,7 @@ class Asking:
     def run(self, *tickets: Any) -> None:
         for ticket in tickets:
             self.tickets.put(ticket)
-        self.board.environment.run(until=2 * SECOND_NS)
+        self.board.environment.run(until=2 * ANSWER_NS)
 
 
 @pytest.mark.parametrize("hardware", [False, True])
@@ -147,7 +147,7 @@ def test_calls_that_are_pushed_out_before_they_are_sent_are_counted_and_told_as_
 def test_every_call_ends_however_slow_its_callback_is() -> None:
     class Slow(Asking):
         def hear_in_hardware(self, thread: HardwareThread) -> Steps:
-            yield self.board.environment.timeout(SECOND_NS // 100)
+            yield self.board.environment.timeout(ANSWER_NS // 100)
             yield from super().hear_in_hardware(thread)
 
     case = Slow(hardware=True)
@@ -192,7 +192,7 @@ def test_a_server_that_says_nothing_is_given_up_in_time(caplog: pytest.LogCaptur
     desktop(case.board).node("server").service(SET_BOOL, "set", held.append)
     case.run(1)
     assert [response for _, response in case.heard] == [None]
-    assert case.heard[0][0] == 100 + 1000 + SECOND_NS
+    assert case.heard[0][0] == 100 + 1000 + ANSWER_NS
 
 
 def test_a_refused_call(caplog: pytest.LogCaptureFixture) -> None:
@@ -225,12 +225,12 @@ def test_a_callback_can_tell_which_call_a_response_belongs_to(
     desktop(case.board).node("server").service(SET_BOOL, "set", held.append)
     for ticket in (1, 2, 3):
         case.tickets.put(ticket)
-    case.board.environment.run(until=SECOND_NS // 2)
+    case.board.environment.run(until=ANSWER_NS // 2)
     assert [case.called[number] for number in (1, 2, 3)] == [1, 2, 3]
     # The last call is answered first, the second is refused, the first not answered at all.
     answer = SET_BOOL.response.encode(SET_BOOL.response.cls(success=True, message=""))
     held[2].responder.respond_encoded(answer)
-    case.board.environment.run(until=SECOND_NS // 2 + 10_000)
+    case.board.environment.run(until=ANSWER_NS // 2 + 10_000)
     held[1].responder.fail("no time")
     case.run()
     assert [case.called[number] for number in case.answered if number] == [3, 2, 1]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from itertools import count
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 from reconros_zenoh.executor.callbacks import CallbackEntry, CallbackKind
 from reconros_zenoh.executor.resource_mask import SOFTWARE, ResourceMask
@@ -11,18 +11,7 @@ from reconros_zenoh.executor.resource_mask import SOFTWARE, ResourceMask
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from reconros_zenoh.executor.callbacks import CallbackLists, Dispatch, EventSource
-
-
-class Executor(Protocol):
-    """What both executors have."""
-
-    callbacks: CallbackLists
-
-    def add(self, entry: CallbackEntry) -> None: ...
-    def refresh(self, entry: CallbackEntry) -> None: ...
-    def select(self, worker: object, resource: int) -> Dispatch | None: ...
-    def finish(self, dispatch: Dispatch) -> None: ...
+    from reconros_zenoh.executor.callbacks import CallbackLists, EventSource
 
 
 class EventQueue:
@@ -65,21 +54,21 @@ def callback(
     return CallbackEntry(name, kind, mask, source)
 
 
-def always_ready(executor: Executor, **lists: str) -> None:
+def always_ready(executor: CallbackLists, **lists: str) -> None:
     """Register callbacks that are ready all the time: `SUB="a b"` registers the subscribers a and b."""
     for kind, names in lists.items():
         for name in names.split():
             executor.add(callback(name, CallbackKind[kind], AlwaysReady()))
 
 
-def arrive(executor: Executor, entry: CallbackEntry, event: object = None) -> None:
+def arrive(executor: CallbackLists, entry: CallbackEntry, event: object = None) -> None:
     """Put an event into the callback's EventQueue and tell the executor."""
     assert isinstance(entry.source, EventQueue)
     entry.source.events.append(event)
     executor.refresh(entry)
 
 
-def serve(executor: Executor, worker: object = "worker", resource: int = SOFTWARE) -> str | None:
+def serve(executor: CallbackLists, worker: object = "worker", resource: int = SOFTWARE) -> str | None:
     """Let the worker run one callback to completion and return its name."""
     dispatch = executor.select(worker, resource)
     if dispatch is None:
@@ -88,6 +77,6 @@ def serve(executor: Executor, worker: object = "worker", resource: int = SOFTWAR
     return dispatch.entry.name
 
 
-def serve_many(executor: Executor, times: int, worker: object = "worker") -> str:
+def serve_many(executor: CallbackLists, times: int, worker: object = "worker") -> str:
     """Let the software worker run that many callbacks and return their names."""
     return " ".join(str(serve(executor, worker)) for _ in range(times))

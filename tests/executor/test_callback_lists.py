@@ -3,43 +3,45 @@
 from __future__ import annotations
 
 import pytest
-from callbacks_for_tests import AlwaysReady, EventQueue, Executor, arrive, callback, implementation, serve
+from callbacks_for_tests import AlwaysReady, EventQueue, arrive, callback, implementation, serve
 
-from reconros_zenoh.executor.callbacks import CallbackKind
+from reconros_zenoh.executor.callbacks import CallbackKind, CallbackLists
 from reconros_zenoh.executor.reconros import ReconrosExecutor
 from reconros_zenoh.executor.resource_mask import SOFTWARE
 from reconros_zenoh.executor.standard import StandardExecutor
 
 
 @pytest.fixture(params=[ReconrosExecutor, StandardExecutor])
-def executor(request: pytest.FixtureRequest) -> Executor:
-    made: Executor = request.param()
+def executor(request: pytest.FixtureRequest) -> CallbackLists:
+    made: CallbackLists = request.param()
     return made
 
 
-def test_the_lists_stand_in_the_order_of_kinds_each_in_the_order_of_registration(executor: Executor) -> None:
+def test_the_lists_stand_in_the_order_of_kinds_each_in_the_order_of_registration(
+    executor: CallbackLists,
+) -> None:
     for name in ("CLT b", "SUB b", "TMR b", "SRV b", "SUB a", "TMR a", "CLT a", "SRV a"):
         executor.add(callback(name, CallbackKind[name[:3]], EventQueue()))
-    names = [entry.name for entry in executor.callbacks]
+    names = [entry.name for entry in executor]
     assert names == ["TMR b", "TMR a", "SUB b", "SUB a", "SRV b", "SRV a", "CLT b", "CLT a"]
     for kind in CallbackKind:
-        assert [entry.index for entry in executor.callbacks[kind]] == [0, 1]
-        assert len(executor.callbacks[kind]) == 2
+        assert [entry.index for entry in executor[kind]] == [0, 1]
+        assert len(executor[kind]) == 2
 
 
 @pytest.mark.parametrize("kind", CallbackKind)
-def test_a_name_is_registered_once_whatever_the_kind(executor: Executor, kind: CallbackKind) -> None:
+def test_a_name_is_registered_once_whatever_the_kind(executor: CallbackLists, kind: CallbackKind) -> None:
     first = callback("sort", CallbackKind.SRV, EventQueue())
     executor.add(first)
     with pytest.raises(ValueError, match="a callback named 'sort' is registered already"):
         executor.add(callback("sort", kind, AlwaysReady()))
-    assert list(executor.callbacks) == [first]
+    assert list(executor) == [first]
     assert serve(executor) is None
 
 
 @pytest.mark.parametrize("kind", CallbackKind)
 def test_a_worker_takes_the_oldest_event_and_the_implementation_for_its_resource(
-    executor: Executor, kind: CallbackKind
+    executor: CallbackLists, kind: CallbackKind
 ) -> None:
     entry = callback("a", kind, EventQueue("old", "new"), (SOFTWARE, 0, 1))
     executor.add(entry)
@@ -54,7 +56,7 @@ def test_a_worker_takes_the_oldest_event_and_the_implementation_for_its_resource
 
 @pytest.mark.parametrize("kind", CallbackKind)
 def test_a_callback_that_runs_is_not_started_again_until_it_has_finished(
-    executor: Executor, kind: CallbackKind
+    executor: CallbackLists, kind: CallbackKind
 ) -> None:
     executor.add(callback("a", kind, AlwaysReady()))
     running = executor.select("first", SOFTWARE)
@@ -66,7 +68,7 @@ def test_a_callback_that_runs_is_not_started_again_until_it_has_finished(
 
 @pytest.mark.parametrize("kind", CallbackKind)
 def test_an_event_that_comes_while_the_callback_runs_waits_until_it_has_finished(
-    executor: Executor, kind: CallbackKind
+    executor: CallbackLists, kind: CallbackKind
 ) -> None:
     entry = callback("a", kind, EventQueue("first"))
     executor.add(entry)
@@ -82,7 +84,7 @@ def test_an_event_that_comes_while_the_callback_runs_waits_until_it_has_finished
 
 @pytest.mark.parametrize("kind", CallbackKind)
 def test_a_worker_gets_nothing_that_its_field_of_the_mask_does_not_hold(
-    executor: Executor, kind: CallbackKind
+    executor: CallbackLists, kind: CallbackKind
 ) -> None:
     executor.add(callback("hardware", kind, AlwaysReady(), (0, 2)))
     assert executor.select("software worker", SOFTWARE) is None
@@ -91,7 +93,7 @@ def test_a_worker_gets_nothing_that_its_field_of_the_mask_does_not_hold(
 
 
 @pytest.mark.parametrize("kind", CallbackKind)
-def test_an_event_that_has_gone_is_not_served(executor: Executor, kind: CallbackKind) -> None:
+def test_an_event_that_has_gone_is_not_served(executor: CallbackLists, kind: CallbackKind) -> None:
     source = EventQueue("event")
     entry = callback("a", kind, source)
     executor.add(entry)
@@ -100,7 +102,9 @@ def test_an_event_that_has_gone_is_not_served(executor: Executor, kind: Callback
     assert executor.select("worker", SOFTWARE) is None
 
 
-def test_timers_are_served_first_and_the_one_registered_first_before_the_others(executor: Executor) -> None:
+def test_timers_are_served_first_and_the_one_registered_first_before_the_others(
+    executor: CallbackLists,
+) -> None:
     first, second = (callback(f"timer {number}", CallbackKind.TMR, EventQueue()) for number in (1, 2))
     executor.add(callback("subscriber", CallbackKind.SUB, AlwaysReady()))
     executor.add(first)
@@ -114,7 +118,7 @@ def test_timers_are_served_first_and_the_one_registered_first_before_the_others(
     assert [serve(executor) for _ in range(4)] == ["timer 1", "timer 1", "timer 2", "subscriber"]
 
 
-def test_hundreds_of_callbacks_are_served_in_the_order_of_registration(executor: Executor) -> None:
+def test_hundreds_of_callbacks_are_served_in_the_order_of_registration(executor: CallbackLists) -> None:
     names = [f"{number}" for number in range(300)]
     for name in names:
         executor.add(callback(name, CallbackKind.SUB, AlwaysReady()))

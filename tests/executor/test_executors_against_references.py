@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
-from callbacks_for_tests import EventQueue, Executor, callback, implementation
+from callbacks_for_tests import EventQueue, callback, implementation
 from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
@@ -17,7 +17,7 @@ from reconros_zenoh.executor.resource_mask import SOFTWARE
 from reconros_zenoh.executor.standard import StandardExecutor
 
 if TYPE_CHECKING:
-    from reconros_zenoh.executor.callbacks import CallbackEntry, Dispatch
+    from reconros_zenoh.executor.callbacks import CallbackEntry, CallbackLists, Dispatch
 
 resources = st.integers(SOFTWARE, 2)
 callbacks = st.tuples(st.sampled_from(CallbackKind), st.frozensets(resources, min_size=1))
@@ -40,7 +40,7 @@ class ExecutorMachine(RuleBasedStateMachine):
 
     @initialize(drawn=st.lists(callbacks, min_size=1, max_size=8))
     def register(self, drawn: list[tuple[CallbackKind, frozenset[int]]]) -> None:
-        self.executor: Executor = self.executor_class()
+        self.executor: CallbackLists = self.executor_class()
         self.entries: list[CallbackEntry] = []
         self.models: list[ReferenceCallback] = []
         self.workers: list[Worker] = []

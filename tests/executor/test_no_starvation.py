@@ -29,7 +29,7 @@ from math import prod
 from typing import TYPE_CHECKING
 
 import pytest
-from callbacks_for_tests import AlwaysReady, EventQueue, Executor, always_ready, arrive, callback, serve_many
+from callbacks_for_tests import AlwaysReady, EventQueue, always_ready, arrive, callback, serve_many
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -39,7 +39,7 @@ from reconros_zenoh.executor.resource_mask import SOFTWARE
 from reconros_zenoh.executor.standard import StandardExecutor
 
 if TYPE_CHECKING:
-    from reconros_zenoh.executor.callbacks import Dispatch
+    from reconros_zenoh.executor.callbacks import CallbackLists, Dispatch
 
 NOT_TIMERS = (CallbackKind.SUB, CallbackKind.SRV, CallbackKind.CLT)
 ACTIONS = 200
@@ -73,7 +73,7 @@ class Crowd:
 
     def __init__(
         self,
-        executor: Executor,
+        executor: CallbackLists,
         watched: CallbackEntry,
         others: list[CallbackEntry],
         place: int,
@@ -179,8 +179,8 @@ def test_the_reconros_bound_is_reached_when_every_callback_is_always_ready(
             for each, length in zip(NOT_TIMERS, lengths, strict=True)
         },
     )
-    registered = list(executor.callbacks)
-    for watched in executor.callbacks[kind]:
+    registered = list(executor)
+    for watched in executor[kind]:
         bound = reconros_bound(watched, registered, SOFTWARE)
         served = serve_many(executor, 20 * bound).split()
         turns = [turn for turn, name in enumerate(served) if name == watched.name]
@@ -195,4 +195,4 @@ def test_the_standard_bound_is_reached_by_a_long_callback_that_misses_a_ready_se
     assert long is not None
     assert serve_many(executor, 1, "second") == "a"  # collects a, b and c
     executor.finish(long)
-    assert serve_many(executor, standard_bound(list(executor.callbacks)), "second") == "b c a b c long"
+    assert serve_many(executor, standard_bound(list(executor)), "second") == "b c a b c long"

@@ -6,7 +6,7 @@ import pytest
 
 from reconros_zenoh.board.profile import read_profile
 from reconros_zenoh.experiments.ablation import COMPLETE, MECHANISMS, ablate, runs_of_ablation
-from reconros_zenoh.experiments.parallel import varied
+from reconros_zenoh.experiments.profile_file import varied
 from reconros_zenoh.experiments.roundtrip import application_folder
 
 PROFILE = read_profile("miniitx-zynq7100")

@@ -15,10 +15,11 @@ from reconros_zenoh.cli.calibrate import calibrate as command
 from reconros_zenoh.errors import FileError, UsageError
 from reconros_zenoh.experiments.calibration import calibrated_constants
 from reconros_zenoh.experiments.measured import read_measurements
-from reconros_zenoh.experiments.parallel import Run, records_of, varied
-from reconros_zenoh.experiments.profile_file import profile_file, replacing, with_values
+from reconros_zenoh.experiments.parallel import Run, records_of
+from reconros_zenoh.experiments.profile_file import replacing, varied, with_values
 from reconros_zenoh.experiments.roundtrip import application_folder
 from reconros_zenoh.project.loader import load_project
+from reconros_zenoh.toml_file import TomlFile
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -41,7 +42,7 @@ def fitting_only(path: Path, *places: tuple[str, ...]) -> Path:
     path.write_text(text)
     lines = path.read_text().splitlines(keepends=True)
     for place in places:
-        number = profile_file(str(path)).line(place)
+        number = TomlFile.read(path).line(place)
         assert number is not None
         lines[number - 1] = lines[number - 1].replace('"assumed"', '"calibrated"')
     path.write_text("".join(lines))
@@ -141,7 +142,7 @@ def test_values_are_replaced_and_all_else_is_kept(tmp_path: Path, written: str) 
         text += "\n" + written
     path.write_text(text)
     profile = varied(read_profile(str(path)), {PER_MESSAGE: 0.4321})
-    new = with_values(profile_file(str(path)), {PER_MESSAGE: 0.4321}, profile)
+    new = with_values(TomlFile.read(path), {PER_MESSAGE: 0.4321}, profile)
     path.write_text(new)
     assert read_profile(str(path)) == profile
     assert "value = 0.4321" in new
@@ -157,7 +158,7 @@ def test_a_value_that_cannot_be_replaced_is_named_with_its_line(tmp_path: Path) 
     )
     profile = varied(read_profile(str(path)), {PER_MESSAGE: 0.4321})
     with pytest.raises(FileError, match=r"p\.toml:\d+: the value of model\.dds\.per_message cannot"):
-        with_values(profile_file(str(path)), {PER_MESSAGE: 0.4321}, profile)
+        with_values(TomlFile.read(path), {PER_MESSAGE: 0.4321}, profile)
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from reconros_zenoh.applications.roundtrip.callbacks.checks import check_image, check_leg
+from reconros_zenoh.applications.roundtrip.callbacks.checks import check_image
 from reconros_zenoh.applications.roundtrip.kernels.inverse import inverse_kinematics
 from reconros_zenoh.applications.roundtrip.kernels.sobel import SHAPE, sobel
 
@@ -53,10 +53,6 @@ class InvKinematics:
 
     def __init__(self, publisher: MessageWriter) -> None:
         self._publisher = publisher
-
-    def check(self, message: Any) -> None:
-        """Raise BadMessageError for a leg that the platform does not have."""
-        check_leg(message)
 
     def hardware(self, thread: HardwareThread) -> Generator[Awaitable, object, None]:
         """Publish the servo index (Listing 3)."""

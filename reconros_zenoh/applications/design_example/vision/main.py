@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from reconros_zenoh.applications.design_example.vision.callbacks import Filter, InvKinematics
+from reconros_zenoh.applications.roundtrip.callbacks.checks import check_leg
 from reconros_zenoh.board.timing import Cycles
 from reconros_zenoh.ros.qos import QosProfile, Reliability
 
@@ -28,7 +29,7 @@ def main(app: Application) -> None:
         "inv_kinematics",
         "sub",
         hardware=inverse.hardware,
-        check=inverse.check,
+        check=check_leg,
         hardware_timing=Cycles(INVERSE_CYCLES),
     )
     sobel = Filter(app.writer("ResourceGroupSobel", "pub"), app.types.message("sensor_msgs/msg/Image"))
