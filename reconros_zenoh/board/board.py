@@ -72,7 +72,7 @@ class Board:
         pointer_bytes: int = 4,
         tap: bool = False,
     ) -> None:
-        """`threads` run the computations in wall time; None: they run in line, in virtual time.
+        """In wall time `threads` run the computations, and as many send; None: all in line, in virtual time.
 
         `tap` lets what passes its hardware-mapped topics out into the network, for debugging.
         """
@@ -90,6 +90,8 @@ class Board:
         self.dds = DdsStack(environment, self.cpu, model, self.randomness)
         # Without a model no event has a time that it could miss.
         self.host = Host(environment, threads, modelled=model is not None)
+        # In threads of its own: a message does not wait until a worker's computation has ended.
+        self.sending_host = Host(environment, threads, modelled=model is not None)
         self.spans = Spans()
         self.topics = LocalTopics(self, model, model.topics) if model and model.topics else None
         self.writers: list[TopicWriter] = []
@@ -184,3 +186,4 @@ class Board:
             self.topics.close()
         self.zycap.deinit()
         self.host.close()
+        self.sending_host.close()

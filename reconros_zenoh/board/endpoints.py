@@ -311,7 +311,8 @@ class Writer:
     def _send(self, outgoing: _Outgoing) -> Generator[Awaitable, object, None]:
         yield from self._board.dds.send(outgoing.size, outgoing.timeline)
         # A large message is copied into the transport: not by the thread that keeps the clock.
-        yield from self._board.host.result(self._board.host.start(self, outgoing.send))
+        host = self._board.sending_host
+        yield from host.result(host.start(self, outgoing.send))
         self._board.spans.add(outgoing.timeline)
 
 

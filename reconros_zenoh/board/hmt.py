@@ -181,7 +181,7 @@ class HardwareTopic:
     def open_tap(self) -> None:
         """Publish what passes on the topic's key; without any cost in the model."""
         publisher = self._board.context.transport.publish(self.key, QosProfile())
-        host = self._board.host
+        host = self._board.sending_host
 
         def put(parts: Parts) -> Generator[Awaitable, object, None]:
             yield from host.result(host.start(self, publisher.put, parts, None))

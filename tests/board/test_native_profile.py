@@ -12,6 +12,7 @@ from small_board import desktop, small_board, stages, types
 from reconros_zenoh.board.endpoints import ServiceSource, SubscriptionSource, TopicWriter
 from reconros_zenoh.board.executor import Executor
 from reconros_zenoh.board.profile import read_profile
+from reconros_zenoh.board.spans import Timeline
 from reconros_zenoh.clock.wall import WallEnvironment
 from reconros_zenoh.executor.callbacks import CallbackKind
 
@@ -23,7 +24,6 @@ if TYPE_CHECKING:
     from reconros_zenoh.board.board import Board
     from reconros_zenoh.board.callback import HardwareThread
     from reconros_zenoh.board.software import SoftwareContext
-    from reconros_zenoh.board.spans import Timeline
 
 
 LIMIT_S = 30
@@ -134,3 +134,33 @@ def test_in_wall_time_everything_takes_as_long_as_it_takes(in_hardware: bool) ->
     assert timeline.stages_ns["execution"] >= MS
     assert not {"reconfiguration", "memif", "osif", "dispatch"} & stages(timeline).keys()
     assert board.host.overruns.count == 0
+
+
+def test_what_is_sent_waits_for_no_computation() -> None:
+    environment = WallEnvironment()
+    board = small_board(read_profile("native"), environment=environment, threads=1)
+    word = types().message("std_msgs/msg/UInt32")
+    node = board.context.node("server")
+    source, writer = SubscriptionSource(board, node, word, "in"), TopicWriter(board, node, word, "out")
+    has_arrived = threading.Event()
+    done = environment.event()
+    heard: list[bool] = []
+
+    def send() -> None:
+        writer.send(writer.encode(writer.message(data=1)), Timeline(environment, environment.now))
+
+    def compute(_: Any, __: SoftwareContext) -> None:
+        environment.post(send)
+        heard.append(has_arrived.wait(LIMIT_S))
+        environment.post(done.succeed)
+
+    executor = Executor(board, 1, 0)
+    executor.add_sw_callback("compute", CallbackKind.SUB, source, compute)
+    executor.spin()
+    client = desktop(board).node("client")
+    client.subscription(word, "out", lambda _: has_arrived.set())
+    publisher = client.publisher(word, "in")
+    environment.call_later(0, publisher.publish, word.cls(data=7))
+    environment.run(until=done)
+    board.close()
+    assert heard == [True]
