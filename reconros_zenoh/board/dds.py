@@ -124,8 +124,7 @@ class DdsStack:
             duration_ns *= self._randomness.lognormvariate(0, self._jitter)
         passage = _Passage(duration_ns, Signal())
         self._passages.put(passage)
-        if passage.done.callbacks is not None:
-            yield passage.done
+        yield passage.done
 
     def _pass(self, passage: _Passage) -> Generator[Awaitable, object, None]:
         yield from self._cpu.run_stack(passage.duration_ns * self._core_share, self._core_share)

@@ -73,8 +73,7 @@ class Gateway:
         return self._smt.dropped + self._writer.dropped
 
     def close(self) -> None:
-        """Take the gateway out of the graph and off its stream."""
-        self._topic.unsubscribe(self._hmt)
+        """Take the gateway out of the graph."""
         self._node.close()
 
     def _wake(self) -> None:
@@ -99,8 +98,7 @@ class Gateway:
                 return core.Transferred()
             case core.WriteMemory(streamed):
                 yield from self._board.memif.transfer(streamed.size)
-                if streamed.complete.callbacks is not None:
-                    yield streamed.complete
+                yield streamed.complete
                 streamed.timeline.mark("hmt")
                 return core.Transferred()
             case core.Cancel():
@@ -135,8 +133,7 @@ class Gateway:
         except BadMessageError as error:
             self.refused += 1
             self._board.context.rejections.add(self._topic.key, sender, error)
-        if read.callbacks is not None:
-            yield read
+        yield read
 
     def _read(self, size: int, done: Signal) -> Generator[Awaitable, object, None]:
         yield from self._board.memif.transfer(size)
