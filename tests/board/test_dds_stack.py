@@ -153,9 +153,7 @@ def test_a_large_message_whose_repair_is_lost_too_waits_for_the_next_heartbeat()
     assert stack.draws.numbers == []
 
 
-@pytest.mark.parametrize(
-    ("draws", "comes"), [((0.009,), False), ((0.01, 0.09), False), ((0.01, 0.1), True)]
-)
+@pytest.mark.parametrize(("draws", "comes"), [((0.009,), False), ((0.01, 0.09), False), ((0.01, 0.1), True)])
 def test_with_best_effort_a_large_message_of_which_a_fragment_is_lost_never_comes(
     draws: tuple[float, ...], comes: bool
 ) -> None:

@@ -56,7 +56,9 @@ def test_a_search_starts_behind_the_callback_served_last() -> None:
 
 
 @pytest.mark.parametrize("kind", NOT_TIMERS)
-def test_after_a_search_that_found_nothing_every_list_is_served_from_its_beginning(kind: CallbackKind) -> None:
+def test_after_a_search_that_found_nothing_every_list_is_served_from_its_beginning(
+    kind: CallbackKind,
+) -> None:
     executor = ReconrosExecutor()
     a, b = (callback(name, kind, EventQueue("event")) for name in "ab")
     executor.add(a)
