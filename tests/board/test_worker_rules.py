@@ -154,7 +154,7 @@ def test_software_and_hardware_workers_poll_at_their_own_pace() -> None:
 
 @pytest.mark.parametrize(("kind", "order"), [("reconros", "b c a b"), ("standard", "b a b c")])
 def test_the_kind_of_the_executor_decides_who_is_next(kind: ExecutorKind, order: str) -> None:
-    # ReconROS goes on behind the callback it served last; ROS 2 collects what is ready, in the order of names.
+    # ReconROS goes on behind the callback it served last; ROS 2 collects what is ready, a first.
     board = SoftwareBoard(small_profile(dict.fromkeys("abc", (100, 0))), kind=kind)
     board.sources["b"].put_at(0)
     for name in "abc":

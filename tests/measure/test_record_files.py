@@ -138,9 +138,9 @@ def test_a_full_disk_ends_the_experiment(tmp_path):
 
 
 def test_a_line_of_which_the_disk_takes_a_part_ends_the_experiment(tmp_path, monkeypatch):
-    with RecordWriter(tmp_path / "sort.csv") as writer:
-        with monkeypatch.context() as patched, pytest.raises(ExperimentError, match="the disk is full"):
-            patched.setattr(writer, "_file", FullAfter(3))
+    with RecordWriter(tmp_path / "sort.csv") as writer, monkeypatch.context() as patched:
+        patched.setattr(writer, "_file", FullAfter(3))
+        with pytest.raises(ExperimentError, match="the disk is full"):
             writer.write(RoundTrip(0, 1_000_000, "ok"))
 
 
