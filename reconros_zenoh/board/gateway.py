@@ -73,8 +73,7 @@ class Gateway:
         return self._smt.dropped + self._writer.dropped
 
     def close(self) -> None:
-        """Take the gateway out of the graph and off its stream."""
-        self._topic.unsubscribe(self._hmt)
+        """Take the gateway out of the graph."""
         self._node.close()
 
     def _wake(self) -> None:

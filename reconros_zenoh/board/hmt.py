@@ -90,12 +90,11 @@ class Fifo:
         self.messages: deque[Streamed] = deque()
         self.held = 0
         self.room = Signal()
-        self.is_open = True
 
     @property
     def is_full(self) -> bool:
         """Whether every place is taken, by messages on their way included."""
-        return self.is_open and self.held >= self.plan.depth
+        return self.held >= self.plan.depth
 
     @property
     def blocks(self) -> bool:
@@ -112,21 +111,14 @@ class Fifo:
 
     def append(self, streamed: Streamed) -> None:
         """Put a message, whose place is taken already, where its reader finds it."""
-        if self.is_open:
-            self.messages.append(streamed)
-            self.on_ready()
+        self.messages.append(streamed)
+        self.on_ready()
 
     def take(self) -> Streamed:
         """Remove the oldest message and return it; its place is free."""
         streamed = self.messages.popleft()
         self.release()
         return streamed
-
-    def close(self) -> None:
-        """Let nobody wait for room."""
-        self.is_open = False
-        self.held += 1
-        self.release()
 
     def release(self) -> None:
         """Free a place."""
@@ -172,11 +164,6 @@ class HardwareTopic:
     def subscribe(self, fifo: Fifo) -> None:
         """Let every message that passes from now on reach this FIFO."""
         self._fifos.append(fifo)
-
-    def unsubscribe(self, fifo: Fifo) -> None:
-        """Let nothing reach this FIFO any more; a stream that waits for its room goes on."""
-        self._fifos.remove(fifo)
-        fifo.close()
 
     def open_tap(self) -> None:
         """Publish what passes on the topic's key; without any cost in the model."""

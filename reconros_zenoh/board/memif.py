@@ -22,7 +22,8 @@ class Memif:
 
     def __init__(self, environment: VirtualEnvironment, bytes_per_ns: float | None) -> None:
         self._modelled = bytes_per_ns is not None
-        self._bus = SharedResource(environment, capacity=bytes_per_ns or 1, per_job=bytes_per_ns or 1)
+        bandwidth = bytes_per_ns or 1
+        self._bus = SharedResource(environment, capacity=bandwidth, per_job=bandwidth)
         self.transferred_bytes = 0
 
     def transfer(self, size: int) -> Generator[Awaitable, object, None]:

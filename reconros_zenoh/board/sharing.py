@@ -67,7 +67,7 @@ class SharedResource:
             return
         job = _Job(work, self._environment.now, self._per_job if limit is None else limit, first=first)
         self._jobs.append(job)
-        if self._contended or (len(self._jobs) > 1 and self._demand() > self._capacity):
+        if self._contended or self._demand() > self._capacity:
             self._share()
         else:
             self._plan(job, job.limit)

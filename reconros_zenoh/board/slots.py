@@ -19,7 +19,7 @@ class Slot:
     slot_id: int
     bitstream_size: int
     clock_hz: float
-    reconfigurable: bool = True
+    reconfigurable: bool
     holds: Bitstream | None = field(default=None, init=False)
     tenants: set[str] = field(default_factory=set, init=False)
     is_given_away: bool = field(default=False, init=False)

@@ -228,7 +228,7 @@ def _is_meant(handle: GoalHandle, goal_id: bytes, stamp_ns: int) -> bool:
     """Tell whether a request to cancel means the goal: by its id, by its time, or because all are meant."""
     if not any(goal_id):
         return not stamp_ns or handle.stamp_ns <= stamp_ns
-    return handle.goal_id == goal_id or 0 < handle.stamp_ns <= stamp_ns
+    return handle.goal_id == goal_id or (stamp_ns > 0 and handle.stamp_ns <= stamp_ns)
 
 
 def _goal_info(owner: MessageType, handle: GoalHandle) -> Any:

@@ -26,6 +26,12 @@ def test_every_hardware_worker_needs_a_slot() -> None:
         Executor(small_board(PROFILE, 2), 0, 3)
 
 
+@pytest.mark.parametrize("workers", [(-1, 0), (0, -1)])
+def test_no_executor_has_fewer_workers_than_none(workers: tuple[int, int]) -> None:
+    with pytest.raises(UsageError, match="there cannot be -1 workers"):
+        Executor(small_board(PROFILE, 2), *workers)
+
+
 def test_the_standard_executor_knows_no_hardware() -> None:
     with pytest.raises(
         UsageError, match='standard executor has no hardware workers; use executor = "reconros"'

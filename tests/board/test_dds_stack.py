@@ -87,6 +87,9 @@ class Stack:
     def send(self, size: int) -> dict[str, int]:
         return self._alone("out", size, 0)
 
+    def steps_of_best_effort(self, size: int) -> Steps:
+        return self._stack.receive(size, 0, Timeline(self.environment, 0), reliable=False)
+
     def _alone(self, direction: str, size: int, transit_ns: int) -> dict[str, int]:
         timeline, end = self.begin("alone", direction, size, transit_ns)
         self.environment.run(until=end)
@@ -147,6 +150,17 @@ def test_a_large_message_of_which_a_fragment_is_lost_is_sent_again_until_none_is
 def test_a_large_message_whose_repair_is_lost_too_waits_for_the_next_heartbeat() -> None:
     stack = Stack(LOSSY, 0.009, 0.25, 0.5)
     assert stack.receive(2000)["retransmission"] == 750_000  # a quarter of the period
+    assert stack.draws.numbers == []
+
+
+@pytest.mark.parametrize(("draws", "comes"), [((0.009,), False), ((0.01, 0.09), False), ((0.01, 0.1), True)])
+def test_with_best_effort_a_large_message_of_which_a_fragment_is_lost_never_comes(
+    draws: tuple[float, ...], comes: bool
+) -> None:
+    stack = Stack(LOSSY, *draws)
+    end = start(stack.environment, stack.steps_of_best_effort(2000))
+    assert stack.environment.run(until=end) is comes
+    assert stack.environment.now == 4500 + 10_100  # nobody sends it again
     assert stack.draws.numbers == []
 
 

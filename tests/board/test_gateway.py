@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
-from small_board import desktop, small_board, small_profile, start, types
+from small_board import desktop, small_board, small_profile, stages, start, types
 
 from reconros_zenoh.board.control import gateways
 from reconros_zenoh.board.endpoints import SubscriptionSource
@@ -69,7 +69,14 @@ class Side:
             self._listen(heard)
         self.software: list[tuple[int, Any]] = []
         source = SubscriptionSource(board, self.node, words, "/a")
-        source.open(lambda: self.software.append((self.environment.now, source.take().message)), None)
+        self.ways: list[dict[str, int]] = []
+
+        def note() -> None:
+            event = source.take()
+            self.software.append((self.environment.now, event.message))
+            self.ways.append(stages(event.timeline))
+
+        source.open(note, None)
         self.writer = board.writer(self.node, words, "/a")
         self.gateway = board.add_gateway("bridge", "/a", "/a", words, 0, qos)
 
@@ -107,6 +114,7 @@ def test_from_hardware_a_message_is_streamed_to_all_and_written_to_memory_once(s
     side.environment.run()
     assert [times_of(heard, body) for heard in side.hardware] == [[U + G]] * subscribers
     assert times_of(side.software, body) == [U + C + A + D]
+    assert side.ways == [{"hmt": U, "gateway": C, "dds": A + D}]
     assert side.board.memif.transferred_bytes == U
 
 
@@ -133,6 +141,16 @@ def test_a_message_between_request_and_cancel_is_forwarded() -> None:
     assert (side.gateway.to_hmt, side.gateway.to_smt) == (1, 1)
 
 
+def test_the_core_goes_on_when_stream_and_memory_are_both_through() -> None:
+    side = Side(small_board(small_profile(cores=4), 2))
+    start(side.environment, side.board.memif.transfer(10 * U))  # another slot: half of the bandwidth is left
+    for number in (1, 2):
+        side.publish_in_software(message(number))
+    side.environment.run()
+    # The first is streamed until U and read until 2 U.
+    assert [time_ns for time_ns, _ in side.hardware[0]] == [U, 2 * U + U]
+
+
 def test_messages_from_both_sides_take_turns() -> None:
     side = Side(small_board(modelled(), 2))
     for number in range(6):
@@ -143,6 +161,9 @@ def test_messages_from_both_sides_take_turns() -> None:
         assert [number for number in heard if number < 100] == list(range(6))
         assert [number for number in heard if number >= 100] == list(range(100, 106))
         assert len(heard) == 12
+    # The core had taken 100 and had room for two more before 0 came. From then on each side has its turn, and
+    # what comes with the cancel of the hardware's turn goes ahead of the software's.
+    assert side.numbers()[0] == [100, 101, 102, 0, 1, 103, 2, 3, 104, 4, 5, 105]
     assert (side.gateway.to_hmt, side.gateway.to_smt, side.gateway.dropped) == (6, 6, 0)
 
 

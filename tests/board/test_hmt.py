@@ -107,6 +107,18 @@ def test_a_full_fifo_that_blocks_holds_the_stream_up_until_there_is_room() -> No
     assert (stream.topic.waits, stream.topic.dropped) == (1, 0)
 
 
+def test_a_fifo_of_which_nothing_is_declared_blocks_the_third_message() -> None:
+    stream = Stream()
+    fifo = stream.fifo("a", FifoPlan())
+    for _ in range(3):
+        stream.publish(message(100))
+    stream.environment.run()
+    assert stream.seen == [(100, "a"), (200, "a")]
+    fifo.take()
+    stream.environment.run()
+    assert stream.seen[2:] == [(300, "a")]
+
+
 def test_a_full_fifo_that_drops_holds_nobody_up() -> None:
     stream = Stream()
     slow = stream.fifo("slow", FifoPlan(1, "drop"))

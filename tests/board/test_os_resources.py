@@ -165,8 +165,9 @@ def test_only_the_holder_unlocks(caplog: pytest.LogCaptureFixture) -> None:
     assert mutex.try_lock("you")
 
 
+@pytest.mark.parametrize("in_software", [False, True])
 @pytest.mark.parametrize(("broadcast", "woken"), [(False, ["a"]), (True, ["a", "b"])])
-def test_a_condition_wakes_one_or_all(broadcast: bool, woken: list[str]) -> None:
+def test_a_condition_wakes_one_or_all(broadcast: bool, woken: list[str], in_software: bool) -> None:
     went_on: list[str] = []
     shared: list[Condition] = []
 
@@ -183,8 +184,15 @@ def test_a_condition_wakes_one_or_all(broadcast: bool, woken: list[str]) -> None
         yield from thread.compute_cycles(10_000)
         yield from (thread.cond_broadcast if broadcast else thread.cond_signal)(shared[0])
 
-    slots = Slots(a=waits("a"), b=waits("b"), c=wakes)
+    def wakes_from_software(_: object, context: SoftwareContext) -> None:
+        (context.cond_broadcast if broadcast else context.cond_signal)(shared[0])
+
+    slots = Slots(a=waits("a"), b=waits("b"), **({} if in_software else {"c": wakes}))
     environment = slots.board.environment
+    if in_software:
+        source = Tickets(slots.board)
+        slots.executor.add_sw_callback("c", SUB, source, wakes_from_software)
+        source.put_at(10_000)
     shared.append(Condition(environment, Mutex(environment)))
     slots.run()
     assert went_on == woken

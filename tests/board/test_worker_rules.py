@@ -152,6 +152,17 @@ def test_software_and_hardware_workers_poll_at_their_own_pace() -> None:
     assert log == [(700, "b starts"), (100 + 1000, "a starts"), (1110, "a is done")]
 
 
+@pytest.mark.parametrize(("kind", "order"), [("reconros", "b c a b"), ("standard", "b a b c")])
+def test_the_kind_of_the_executor_decides_who_is_next(kind: ExecutorKind, order: str) -> None:
+    # ReconROS goes on behind the callback it served last; ROS 2 collects what is ready, a first.
+    board = SoftwareBoard(small_profile(dict.fromkeys("abc", (100, 0))), kind=kind)
+    board.sources["b"].put_at(0)
+    for name in "abc":
+        board.sources[name].put_at(50)
+    board.environment.run(until=1000)
+    assert " ".join(what[0] for _, what in board.log if what.endswith("starts")) == order
+
+
 def test_the_standard_executor_waits_for_events_instead_of_polling() -> None:
     board = SoftwareBoard(small_profile({"a": (100, 0)}, software_poll_ns=1000), kind="standard")
     board.sources["a"].put_at(30)

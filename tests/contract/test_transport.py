@@ -462,11 +462,14 @@ def test_a_request_without_a_server_is_over(network: Network) -> None:
 
 def test_a_request_that_no_server_keeps_is_over_before_its_time(network: Network) -> None:
     here, there = network.session(), network.session()
-    ends = network.inbox()
+    requests, ends = network.inbox(), network.inbox()
     there.serve("forgetful", lambda _: None)
+    there.serve("retentive", requests.put)
     know(network, here, there)
-    here.request("forgetful").get([b""], None, ends.put, 10**15)
-    network.wait(ends.has(None))
+    here.request("retentive").get([b""], None, lambda _: ends.put("retentive"), LIMIT_NS)
+    here.request("forgetful").get([b""], None, lambda _: ends.put("forgetful"), LIMIT_NS)
+    network.wait(lambda: len(ends.items) > 0)
+    assert ends.items[0] == "forgetful"
 
 
 def test_a_server_answers_with_an_error(network: Network) -> None:

@@ -52,13 +52,13 @@ class ExecutorMachine(RuleBasedStateMachine):
             self.executor.add(entry)
         self.reference = self.reference_class(self.models)
 
-    @rule(number=any_number, burst=st.integers(1, 3))
-    def events_come(self, number: int, burst: int) -> None:
-        for _ in range(burst):
+    @rule(numbers=st.lists(any_number, min_size=1, max_size=6))
+    def events_come(self, numbers: list[int]) -> None:
+        for number in numbers:
             self.events += 1
             self.queue(number).append(self.events)
             self.model(number).events.append(self.events)
-        self.executor.refresh(self.entry(number))
+            self.executor.refresh(self.entry(number))
 
     @rule(number=any_number)
     def events_go(self, number: int) -> None:
@@ -69,8 +69,28 @@ class ExecutorMachine(RuleBasedStateMachine):
     @precondition(lambda self: any(worker.running is None for worker in self.workers))
     @rule(number=any_number)
     def a_worker_selects(self, number: int) -> None:
+        self.select(self.idle_worker(number))
+
+    @precondition(lambda self: any(worker.running is None for worker in self.workers))
+    @rule(number=any_number)
+    def a_worker_serves_until_it_finds_nothing(self, number: int) -> None:
+        worker = self.idle_worker(number)
+        self.select(worker)
+        while worker.running is not None:
+            self.finish(worker)
+            self.select(worker)
+
+    @precondition(lambda self: any(worker.running is not None for worker in self.workers))
+    @rule(number=any_number)
+    def a_worker_finishes(self, number: int) -> None:
+        busy = [worker for worker in self.workers if worker.running is not None]
+        self.finish(busy[number % len(busy)])
+
+    def idle_worker(self, number: int) -> Worker:
         idle = [worker for worker in self.workers if worker.running is None]
-        worker = idle[number % len(idle)]
+        return idle[number % len(idle)]
+
+    def select(self, worker: Worker) -> None:
         work_waits = any(model.could_start(worker.resource) for model in self.models)
         expected = self.reference.choose(worker, worker.resource)
         worker.running = self.executor.select(worker, worker.resource)
@@ -84,11 +104,7 @@ class ExecutorMachine(RuleBasedStateMachine):
         assert worker.running.message == expected.events.pop(0)
         assert worker.running.implementation == implementation(expected.name, worker.resource)
 
-    @precondition(lambda self: any(worker.running is not None for worker in self.workers))
-    @rule(number=any_number)
-    def a_worker_finishes(self, number: int) -> None:
-        busy = [worker for worker in self.workers if worker.running is not None]
-        worker = busy[number % len(busy)]
+    def finish(self, worker: Worker) -> None:
         assert worker.running is not None
         self.executor.finish(worker.running)
         self.models[self.entries.index(worker.running.entry)].running = False

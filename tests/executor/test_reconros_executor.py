@@ -55,6 +55,22 @@ def test_a_search_starts_behind_the_callback_served_last() -> None:
     assert serve_many(executor, 4) == "c a b None"
 
 
+@pytest.mark.parametrize("kind", NOT_TIMERS)
+def test_after_a_search_that_found_nothing_every_list_is_served_from_its_beginning(
+    kind: CallbackKind,
+) -> None:
+    executor = ReconrosExecutor()
+    a, b = (callback(name, kind, EventQueue("event")) for name in "ab")
+    executor.add(a)
+    executor.add(b)
+    assert serve_many(executor, 3) == "a b None"
+    arrive(executor, a)
+    assert serve_many(executor, 2) == "a None"
+    for entry in (b, a):
+        arrive(executor, entry)
+    assert serve_many(executor, 3) == "a b None"
+
+
 def test_lists_are_served_in_the_order_subscribers_service_servers_service_clients() -> None:
     executor = ReconrosExecutor()
     for name in ("CLT", "SRV", "SUB"):

@@ -13,7 +13,7 @@ import pytest
 from reconros_zenoh.board.profile import read_profile
 from reconros_zenoh.cli.calibrate import calibrate as command
 from reconros_zenoh.errors import FileError, UsageError
-from reconros_zenoh.experiments.calibration import calibrated_constants
+from reconros_zenoh.experiments.calibration import Constant, _Evaluation, _search, calibrated_constants
 from reconros_zenoh.experiments.measured import read_measurements
 from reconros_zenoh.experiments.parallel import Run, records_of
 from reconros_zenoh.experiments.profile_file import replacing, varied, with_values
@@ -22,6 +22,7 @@ from reconros_zenoh.project.loader import load_project
 from reconros_zenoh.toml_file import TomlFile
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from pathlib import Path
 
 MINIITX = (resources.files("reconros_zenoh.board") / "profiles" / "miniitx-zynq7100.toml").read_text("utf-8")
@@ -280,3 +281,18 @@ def test_an_assignment_needs_both_sides(tmp_path: Path) -> None:
             tmp_path / "p2.toml",
             mapping=["mixed"],
         )
+
+
+@pytest.mark.parametrize(("allowed", "made"), [(1, 0), (2, 2), (5, 4), (6, 6)])
+def test_the_search_makes_no_more_evaluations_than_allowed(allowed: int, made: int) -> None:
+    constants = [Constant(("model", name), "ns", 1.0, 100.0) for name in ("a", "b")]
+    points: list[tuple[float, ...]] = []
+
+    def evaluate(asked: Sequence[tuple[Sequence[float], int]]) -> list[_Evaluation]:
+        points.extend(tuple(values) for values, _ in asked)
+        return [_Evaluation({}, abs(values[0] - 50) + abs(values[1] - 50)) for values, _ in asked]
+
+    values, objective, used = _search(constants, 98.0, 0.0, allowed, evaluate)
+    assert (len(points), used) == (made, made)
+    assert objective == abs(values[0] - 50) + abs(values[1] - 50)
+    assert (objective < 98) == (made > 0)

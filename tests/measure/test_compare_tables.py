@@ -8,7 +8,7 @@ import pytest
 from board_like_runs import experiment_of, like_the_board
 from rich.console import Console
 
-from reconros_zenoh.measure.compare import experiment_tables, print_tables
+from reconros_zenoh.measure.compare import experiment_tables, grade, print_tables
 from reconros_zenoh.measure.record import Record
 from reconros_zenoh.measure.reference.zynq7100 import reference_cells
 
@@ -35,6 +35,14 @@ def test_the_error_is_signed_and_relative():
     assert experiment_tables(records)["mappings"]["mixed"]["sort"]["median_error"] == pytest.approx(
         -0.2, abs=1e-3
     )
+
+
+@pytest.mark.parametrize(
+    ("error", "expected"),
+    [(0.1, "good"), (-0.1, "good"), (0.11, "fair"), (-0.25, "fair"), (0.26, "bad"), (None, "")],
+)
+def test_an_error_of_a_median_is_good_up_to_a_tenth_and_fair_up_to_a_quarter(error, expected):
+    assert grade(error) == expected
 
 
 def test_only_the_error_takes_the_times_modulo_a_second():

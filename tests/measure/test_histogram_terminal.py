@@ -115,6 +115,21 @@ def test_a_client_without_answers_says_so():
     assert "█" not in text
 
 
+def test_a_client_with_answers_is_shown_beside_one_without():
+    text = "\n".join(shown(entry([3.0]), entry([], "b/sort", lost=7), 1, width=80))
+    assert "100.0 %" in text
+    assert "b/sort: no answer" in text
+    assert "median ratio -" in text
+    described = describe(entry([3.0]), entry([], "b/sort", lost=7), 1)
+    assert (described["counts"], described["compare"]["counts"]) == ([1], [0])
+    assert described["compare"]["median_ratio"] is None
+
+
+def test_bins_lie_around_values_that_are_all_alike_and_between_others_however_close():
+    assert bin_edges([np.array([3.0, 3.0])], 2).tolist() == [2.5, 3.0, 3.5]
+    assert bin_edges([np.array([3.1, 3.3])], 2).tolist() == pytest.approx([3.1, 3.2, 3.3])
+
+
 def test_the_description_agrees_with_numpy():
     ours, theirs = np.linspace(1, 5, 101), np.linspace(2, 6, 101)
     described = describe(entry(ours), entry(theirs, "b/sort", lost=2), 10)

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import io
 from pathlib import Path
 
 import numpy as np
@@ -134,6 +135,24 @@ def test_a_folder_that_cannot_be_written_is_a_usage_error(tmp_path):
 def test_a_full_disk_ends_the_experiment(tmp_path):
     with pytest.raises(ExperimentError, match="/dev/full: a round trip could not be recorded"):
         RecordWriter(Path("/dev/full"))
+
+
+def test_a_line_of_which_the_disk_takes_a_part_ends_the_experiment(tmp_path, monkeypatch):
+    with RecordWriter(tmp_path / "sort.csv") as writer, monkeypatch.context() as patched:
+        patched.setattr(writer, "_file", FullAfter(3))
+        with pytest.raises(ExperimentError, match="the disk is full"):
+            writer.write(RoundTrip(0, 1_000_000, "ok"))
+
+
+class FullAfter(io.BytesIO):
+    """A raw file that takes so many bytes and no more, and says so as `write` does."""
+
+    def __init__(self, room):
+        super().__init__()
+        self._room = room
+
+    def write(self, data):
+        return super().write(data[: self._room])
 
 
 def test_records_are_found_below_a_folder(tmp_path):

@@ -114,6 +114,16 @@ def test_an_unknown_type_is_left_out_with_a_warning(tmp_path: Path, resource: st
     assert warning.startswith(f"{tmp_path}/build.cfg:6: x is no known resource")
 
 
+def test_a_reference_goes_to_the_one_group_that_declares_the_name_with_the_right_type(tmp_path: Path) -> None:
+    configuration = read(
+        tmp_path,
+        f"{GROUP}[ResourceGroup@k]\nnode = rosmsg, std_msgs, msg, UInt32\n"
+        "[ResourceGroup@h]\ntmr = rostmr, node, 10\n",
+    )
+    (timer,) = [resource for resource in configuration.resources if resource.type == "rostmr"]
+    assert timer.node == "/n"
+
+
 def test_a_reference_to_one_of_several_groups(tmp_path: Path) -> None:
     with pytest.raises(FileError, match="2 other groups declare one") as caught:
         read(

@@ -64,6 +64,7 @@ def test_the_slots_of_table_2(regions: str, resources: SlotResources) -> None:
 def test_block_rams_given_in_both_views_count_once() -> None:
     regions = read("RAMB18_X0Y60:RAMB18_X5Y79, RAMB36_X0Y30:RAMB36_X5Y39")
     assert slot_resources(regions) == SlotResources(0, 0, 60, 120)
+    assert slot_resources(read("RAMB18_X0Y60:RAMB18_X0Y69")) == SlotResources(0, 0, 0, 10)
 
 
 def test_an_ultrascale_slice_has_eight_luts() -> None:

@@ -149,6 +149,17 @@ def test_who_is_meant_by_a_request_to_cancel() -> None:
     assert cancel_code(case, ids[0]) == (3, 0)
 
 
+def test_a_time_to_cancel_counts_to_the_nanosecond_and_from_the_start_of_the_clock() -> None:
+    case = Case()
+    ids = []
+    for accepted_ns in (0, 2 * 10**9 + 5, 2 * 10**9 + 6):
+        case.sessions.here_ns = accepted_ns
+        ids.append(case.send())
+    assert cancel_code(case, ids[2]) == (0, 1)  # no time is given: that one alone
+    assert cancel_code(case, bytes(16), 2 * 10**9 + 4) == (0, 1)
+    assert cancel_code(case, ids[2], 2 * 10**9 + 5) == (0, 3)
+
+
 def test_an_aborted_goal_and_one_that_failed() -> None:
     case = Case()
     case.send()

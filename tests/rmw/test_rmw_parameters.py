@@ -24,8 +24,9 @@ VALUES: dict[str, Any] = {
     "counts": [1, 2],
     "gains": [0.5],
     "names": ["a", "b"],
+    "none": [],
 }
-KINDS = [1, 2, 3, 3, 4, 5, 6, 7, 8, 9]
+KINDS = [1, 2, 3, 3, 4, 5, 6, 7, 8, 9, 9]
 
 
 class Remote:

@@ -128,6 +128,7 @@ def test_a_name_may_become_too_long_by_its_namespace() -> None:
 )
 def test_node_names_that_are_not_allowed(name: str, reason: str) -> None:
     check_node_name("sort_node_1")
+    check_node_name("a" * 255)
     with pytest.raises(UsageError, match=re.escape(reason)):
         check_node_name(name)
     with pytest.raises(UsageError, match=re.escape(reason)):

@@ -42,6 +42,9 @@ def test_accepts_what_zenoh_accepts(text: str) -> None:
         ("@ros2_lv/0/*", "@ros2_lv/0", False),
         ("@ros2_lv/0/**", "@ros2_lv/0", True),
         ("reconros/*/status", "reconros/board_1/**", True),
+        ("reconros/board$*/status", "reconros/board_1/status", True),
+        ("reconros/board$*/status", "reconros/my_board/status", False),
+        ("$*lv/0", "@ros2_lv/0", False),
     ],
 )
 def test_intersects(left: str, right: str, expected: bool) -> None:
