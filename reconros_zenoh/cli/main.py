@@ -15,6 +15,7 @@ from pathlib import Path
 
 import typer
 
+from reconros_zenoh.cli.printable import printable
 from reconros_zenoh.errors import ReconrosError, TransportError, UsageError
 
 _FINISHING_S = 5.0
@@ -107,7 +108,7 @@ def _application(verbs: list[str]) -> typer.Typer:
 
 
 def _fail(error: ReconrosError, status: int) -> None:
-    print(f"reconros: {_printable(str(error))}", file=sys.stderr)
+    print(f"reconros: {printable(str(error))}", file=sys.stderr)
     if "--json" in sys.argv:
         print(json.dumps({"error": str(error)}), flush=True)
     sys.exit(status)
@@ -121,22 +122,13 @@ class Formatter(logging.Formatter):
         text = super().formatMessage(record)
         if len(text) > _LONGEST_LINE:
             text = f"{text[: _LONGEST_LINE // 2]} ... {text[-_LONGEST_LINE // 2 :]}"
-        return _printable(text, line_ends=False)
+        return printable(text, line_ends=False)
 
 
 def _log_to_stderr() -> None:
     handler = logging.StreamHandler()
     handler.setFormatter(Formatter("%(levelname)s %(name)s: %(message)s"))
     logging.basicConfig(level=logging.INFO, handlers=[handler])
-
-
-def _printable(text: str, *, line_ends: bool = True) -> str:
-    """Return a text, which may quote what came from elsewhere, with control characters written out."""
-    kept = "\n" if line_ends else ""
-    return "".join(
-        letter if letter.isprintable() or letter in kept else letter.encode("unicode_escape").decode()
-        for letter in text
-    )
 
 
 def _drop_output() -> None:

@@ -84,6 +84,12 @@ MISTAKES = {
     "a tag that does not fit": (NODES + "  A: {publishers: [n1],\n    size: !!int x}", 4, "cannot be read"),
     "a mapping that is merged into itself": ("nodes: &a\n  <<: *a\ntopics: {}", 1, "cannot be read"),
     "a key that is a list": ("a: &a [[x]]\n? *a\n: b", 3, "cannot be read"),
+    "a node that tells a terminal what to do": (
+        'nodes:\n  "\\x1b]0;mine": hardware\ntopics: {}',
+        2,
+        "cannot be printed",
+    ),
+    "a topic in two lines": (NODES + '  "a\\nb": {publishers: [n1]}', 3, "cannot be printed"),
     "an empty list of publishers": (NODES + "  A:\n    publishers: []", 3, "topics.A has no publisher"),
     "one node for a list": (NODES + "  A: {publishers: n1}", 3, "must be a list"),
     "a node that is a number": (NODES + "  A: {publishers: [1]}", 3, "must be a string"),
