@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from contextlib import suppress
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import TYPE_CHECKING, Self
@@ -79,6 +80,11 @@ class PictureServer:
         class Handler(BaseHTTPRequestHandler):
             pictures = self
 
+            def handle(self) -> None:
+                """Answer until the browser has gone."""
+                with suppress(ConnectionError):
+                    super().handle()
+
             def do_GET(self) -> None:
                 """Answer with the page or the stream."""
                 if self.path == "/":
@@ -101,12 +107,9 @@ class PictureServer:
 
             def _stream(self) -> None:
                 seen = 0
-                try:
-                    while (found := self.pictures.next_jpeg(seen)) is not None:
-                        seen, jpeg = found
-                        self.wfile.write(b"--picture\r\nContent-Type: image/jpeg\r\n")
-                        self.wfile.write(b"Content-Length: %d\r\n\r\n%b\r\n" % (len(jpeg), jpeg))
-                except ConnectionError:  # the browser has gone
-                    return
+                while (found := self.pictures.next_jpeg(seen)) is not None:
+                    seen, jpeg = found
+                    self.wfile.write(b"--picture\r\nContent-Type: image/jpeg\r\n")
+                    self.wfile.write(b"Content-Length: %d\r\n\r\n%b\r\n" % (len(jpeg), jpeg))
 
         return Handler

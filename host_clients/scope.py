@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 
 _LATE_NS = 1_000_000_000
+_MOST_WAITING = 1000  # commands without an index, or the reverse; then one side is gone or hostile
 
 
 class Scope:
@@ -42,7 +43,7 @@ class Scope:
         self._commands = 0
         self._matched = False
         self._open: deque[_Command] = deque()
-        self._early: deque[tuple[int, int]] = deque()
+        self._early: deque[tuple[int, int]] = deque(maxlen=_MOST_WAITING)
         self._node = context.node("scope")
         word = types.message("std_msgs/msg/UInt32")
         self._node.subscription(word, "/ctrl_out", self._on_ctrl_out, check=check_leg)
@@ -60,6 +61,8 @@ class Scope:
     def _command(self, word: int, sent_ns: int) -> None:
         self._open.append(_Command(self._commands, inverse_kinematics(word), sent_ns))
         self._commands += 1
+        if len(self._open) > _MOST_WAITING:
+            self._on_trip(RoundTrip(self._open.popleft().number, None, "lost"))
         for index in list(self._early):
             if self._match(*index):
                 self._early.remove(index)

@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from reconros_zenoh.ros.types import TypeRegistry
 
 _SECOND_NS = 1_000_000_000
+_MOST_DIGITS = 12
+_MOST_LEFT_OUT = 100_000  # hours of pictures; each is one line in the record
 
 
 class Viewer:
@@ -48,8 +50,19 @@ class Viewer:
         self._next = 0
         self._node = context.node("viewer")
         self._node.subscription(
-            types.message("sensor_msgs/msg/Image"), "/image_filtered", self._arrive, check=_check
+            types.message("sensor_msgs/msg/Image"), "/image_filtered", self._arrive, check=self._check
         )
+
+    def _check(self, message: Any) -> None:
+        """Raise BadMessageError for what the camera's pictures cannot have become."""
+        check_image(message, "bgr8", *SHAPE)
+        text = message.header.frame_id
+        if not (text.isdecimal() and len(text) <= _MOST_DIGITS):
+            raise BadMessageError("frame_id", f"the frame_id is {text!r}, not a number")
+        if int(text) - self._next > _MOST_LEFT_OUT:
+            raise BadMessageError("frame_id", f"the frame_id is {text}, far behind {self._next}")
+        if _stamp_ns(message) > self._node.context.clock_ns():
+            raise BadMessageError("stamp", "the picture was taken later than now: the clocks differ")
 
     def _arrive(self, received: Received) -> None:
         """Note, on any thread, that a picture has come."""
@@ -60,19 +73,16 @@ class Viewer:
         for left_out in range(self._next, number):
             self._on_trip(RoundTrip(left_out, None, "lost"))
         self._next = number + 1
-        stamp = message.header.stamp
         picture = message.data.reshape(SHAPE)
         right = np.array_equal(picture, _expected(number % FRAMES))
-        time_ns = arrived_ns - (stamp.sec * _SECOND_NS + stamp.nanosec)
+        time_ns = arrived_ns - _stamp_ns(message)
         self._on_trip(RoundTrip(number, time_ns, "ok" if right else "wrong"))
         self._on_picture(picture)
 
 
-def _check(message: Any) -> None:
-    """Raise BadMessageError for what the camera's pictures cannot have become."""
-    check_image(message, "bgr8", *SHAPE)
-    if not message.header.frame_id.isdecimal():
-        raise BadMessageError("frame_id", f"the frame_id is {message.header.frame_id!r}, not a number")
+def _stamp_ns(message: Any) -> int:
+    stamp = message.header.stamp
+    return int(stamp.sec * _SECOND_NS + stamp.nanosec)
 
 
 @cache

@@ -73,9 +73,9 @@ class BadMessageError(ReconrosError):
 
     `reason` is a short stable word under which the board counts it: one of
     `no_attachment`, `foreign_domain`, `type_mismatch`, `truncated`, `foreign_encoding`, or a reason of the
-    callback or client that refused it (`image_size`, `image_encoding`, `number_count`, `leg`, `frame_id`),
-    `check_failed` where its check failed itself, `goal_queue` for a goal that no place is left for, or
-    `fifo_size` for one that is larger than a FIFO of a hardware-mapped topic.
+    callback or client that refused it (`image_size`, `image_encoding`, `number_count`, `leg`, `frame_id`,
+    `stamp`), `check_failed` where its check failed itself, `goal_queue` for a goal that no place is left for,
+    or `fifo_size` for one that is larger than a FIFO of a hardware-mapped topic.
     """
 
     def __init__(self, reason: str, detail: str) -> None:

@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from ruamel.yaml import YAML
-from ruamel.yaml.constructor import DuplicateKeyError
+from ruamel.yaml.composer import Composer, ComposerError
+from ruamel.yaml.constructor import DuplicateKeyError, RoundTripConstructor
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 from ruamel.yaml.reader import ReaderError
 
@@ -25,6 +26,36 @@ _VARIABLE = re.compile(
 )
 # The parser's words; behind them it prints the whole values.
 _DUPLICATE_KEY = re.compile(r'duplicate key "(.+?)" with value')
+_DEEPEST = 50  # far less than Python can take
+_MOST_BITS = 64  # Python prints no number of thousands of digits
+
+
+class _Composer(Composer):
+    """Refuses what is nested deeper than any file of ours."""
+
+    _depth = 0
+
+    def compose_node(self, parent: Any, index: Any) -> Any:
+        self._depth += 1
+        if self._depth > _DEEPEST:
+            mark = self.parser.peek_event().start_mark
+            raise ComposerError(None, None, "it is nested too deeply", mark)
+        node = super().compose_node(parent, index)
+        self._depth -= 1
+        return node
+
+
+class _Constructor(RoundTripConstructor):
+    """Knows in which line (from 0) the value stands that it makes, and refuses endless numbers."""
+
+    line = 0
+
+    def construct_object(self, node: Any, deep: bool = False) -> Any:
+        self.line = node.start_mark.line
+        value = super().construct_object(node, deep)
+        if isinstance(value, int) and value.bit_length() > _MOST_BITS:
+            raise ValueError(f"a whole number has at most {_MOST_BITS} bits")
+        return value
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,8 +76,10 @@ class Node:
     def read(cls, path: Path, environment: Mapping[str, str]) -> Node:
         """Return the whole file; raise FileError when it cannot be read or is not YAML."""
         text = read_text_file(path, "Give a readable YAML file.")
+        yaml = YAML(typ="rt")
+        yaml.Composer, yaml.Constructor = _Composer, _Constructor
         try:
-            value = YAML(typ="rt").load(text)
+            value = yaml.load(text)
         except ReaderError as error:
             line = text.count("\n", 0, error.position) + 1
             raise FileError(path, line, "has a character that YAML does not allow.", "Remove it.") from None
@@ -63,6 +96,13 @@ class Node:
             raise FileError(path, place, f"is not YAML: {error.problem}.", "Correct the syntax.") from None
         except YAMLError as error:
             raise FileError(path, None, f"is not YAML: {error}.", "Correct the syntax.") from None
+        except Exception as error:  # noqa: BLE001 # a date or number that cannot be is an error of any kind
+            raise FileError(
+                path,
+                yaml.constructor.line + 1,
+                f"has a value that cannot be read ({error}).",
+                "Correct it, or put it in quotes.",
+            ) from None
         return cls(value, "the file", 1, path, environment)
 
     def error(self, problem: str, remedy: str) -> FileError:
@@ -95,7 +135,7 @@ class Node:
         if isinstance(self.value, int) and not isinstance(self.value, bool):
             return int(self.value)
         text = self.text() if isinstance(self.value, str) else ""
-        if not re.fullmatch(r"\d+", text, re.ASCII):
+        if not re.fullmatch(r"\d{1,19}", text, re.ASCII):
             raise self._wrong_type("a whole number")
         return int(text)
 

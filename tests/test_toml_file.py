@@ -119,3 +119,26 @@ def test_a_file_that_is_not_utf_8(path: Path) -> None:
     path.write_bytes(b"name = '\xff'")
     with pytest.raises(FileError, match=r"some.toml:1: The text is not UTF-8"):
         TomlFile.read(path)
+
+
+def test_an_unknown_table_that_has_only_headers_of_tables_in_it(path: Path) -> None:
+    path.write_text("a = 1\n[callbakcs.sobel]\nsoftware = true\n")
+    assert TomlFile.read(path).line(("callbakcs",)) == 2
+
+
+@pytest.mark.parametrize(
+    ("value", "problem"),
+    [
+        ("[" * 3000, "is nested too deeply"),
+        ("[\n" * 3000, "is nested too deeply"),
+        ("9" * 5000, "has a number of thousands of digits"),
+        ("1\n[" + "a." * 100 + "a]", "is nested too deeply"),
+        ("1\n" + '"a" . ' * 50_000 + "a = 1", "is nested too deeply"),
+    ],
+)
+def test_a_value_that_python_cannot_take(path: Path, value: str, problem: str) -> None:
+    path.write_text(f"a = 1\nb = {value}\nc = 2\n")
+    with pytest.raises(FileError, match=problem) as caught:
+        TomlFile.read(path)
+    assert caught.value.line is not None
+    assert caught.value.line > 1

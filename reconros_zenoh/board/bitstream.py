@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from reconros_zenoh.errors import BitstreamError, UsageError
+from reconros_zenoh.text_file import check_file
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -18,6 +19,7 @@ _HEADER = struct.Struct("<8sHHQ")
 _CRC = struct.Struct("<I")
 _NAME_AT = _HEADER.size + _CRC.size
 _MAGIC = b"RRZBIT01"
+_LIMIT_BYTES = 1_000_000_000
 _REBUILD = "Write it again with `reconros build`."
 
 
@@ -54,8 +56,9 @@ class Bitstream:
 
     @classmethod
     def read(cls, path: Path) -> Bitstream:
-        """Return what the file holds; raise BitstreamError when it is damaged."""
+        """Return what the file holds; raise BitstreamError when it is damaged, FileError for no file."""
         try:
+            check_file(path, _REBUILD, _LIMIT_BYTES)
             content = path.read_bytes()
         except OSError as error:
             raise BitstreamError(path, None, f"cannot be read ({error.strerror}).", _REBUILD) from None
@@ -67,7 +70,7 @@ class Bitstream:
         crc = zlib.crc32(memoryview(content)[_NAME_AT:], zlib.crc32(content[: _HEADER.size]))
         if _CRC.unpack_from(content, _HEADER.size) != (crc,):
             raise BitstreamError(path, None, "is damaged (CRC-32 differs).", _REBUILD)
-        return cls(slot, content[_NAME_AT : _NAME_AT + name_length].decode(), size)
+        return cls(slot, content[_NAME_AT : _NAME_AT + name_length].decode(errors="replace"), size)
 
 
 def read_bitstreams(folder: Path, wanted: Iterable[Bitstream]) -> Mapping[tuple[int, str], Bitstream]:

@@ -10,12 +10,16 @@ from threading import Event
 from typing import TYPE_CHECKING, Any
 
 import msgpack
+from pydantic import ValidationError
 
+from reconros_zenoh.board.answers import VERSION, StatusAnswer
 from reconros_zenoh.clock.wall import WallEnvironment
 from reconros_zenoh.errors import TransportError, UsageError
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
+
+    from pydantic import BaseModel
 
     from reconros_zenoh.board.board import Board
     from reconros_zenoh.board.endpoints import TopicWriter
@@ -24,9 +28,9 @@ if TYPE_CHECKING:
 
 _log = logging.getLogger(__name__)
 
-VERSION = 1
 _HOST_ANEW = b"host anew"
 _ANSWER_NS = 2_000_000_000
+_LONGEST_ANSWER = 10_000_000
 
 
 def alive_key(board: str) -> str:
@@ -166,11 +170,16 @@ def ask_status(transport: Transport, board: str, *, host_anew: bool = False) -> 
 
     With `host_anew` what it says of its host counts from then on, for all who ask.
     """
-    return ask(transport, board, "status", _HOST_ANEW if host_anew else b"")
+    return ask(transport, board, "status", _HOST_ANEW if host_anew else b"", StatusAnswer)
 
 
-def ask(transport: Transport, board: str, what: str, question: bytes) -> dict[str, Any]:
-    """Return what the board answers on `reconros/<board>/<what>`; raise TransportError without an answer."""
+def ask(
+    transport: Transport, board: str, what: str, question: bytes, form: type[BaseModel]
+) -> dict[str, Any]:
+    """Return what the board answers on `reconros/<board>/<what>`.
+
+    Raise TransportError without an answer, and for one that is not of this form.
+    """
     found = Event()
     replies: SimpleQueue[Reply | None] = SimpleQueue()
 
@@ -194,9 +203,25 @@ def ask(transport: Transport, board: str, what: str, question: bytes) -> dict[st
         raise TransportError(
             f"no board named {board!r} answers. Start it with `reconros board --name {board}`{others}."
         )
-    answer: dict[str, Any] = msgpack.unpackb(reply.payload)
-    if answer.get("version") != VERSION:
-        raise TransportError(
-            f"board {board!r} speaks version {answer.get('version')} of the {what}, not {VERSION}."
-        )
+    if len(reply.payload) > _LONGEST_ANSWER:
+        raise _no_answer(board, what, f"it has {len(reply.payload)} bytes")
+    try:
+        answer: dict[str, Any] = msgpack.unpackb(reply.payload)
+        if isinstance(answer, dict) and answer.get("version") != VERSION:
+            raise TransportError(
+                f"board {board!r} speaks version {answer.get('version')} of the {what}, not {VERSION}."
+            )
+        form.model_validate(answer)
+    except ValidationError as error:
+        first = error.errors()[0]
+        raise _no_answer(board, what, f"{'.'.join(map(str, first['loc']))}: {first['msg']}") from None
+    except ValueError as error:
+        raise _no_answer(board, what, repr(error)) from None
     return answer
+
+
+def _no_answer(board: str, what: str, problem: str) -> TransportError:
+    return TransportError(
+        f"what calls itself board {board!r} answers with what is no {what} ({problem}). "
+        "Find out what runs there."
+    )

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 import msgpack
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from reconros_zenoh.board.control import VERSION, ask, gateways
+from reconros_zenoh.board.answers import VERSION, GatewayAnswer
+from reconros_zenoh.board.control import ask, gateways
 from reconros_zenoh.errors import UsageError
 from reconros_zenoh.ros.graph import EndpointToken, parse, tokens_expression
 from reconros_zenoh.ros.names import dds_type_name, resolve
@@ -105,7 +106,7 @@ def ask_gateways(transport: Transport, board: str, add: dict[str, Any] | None = 
     refuses it.
     """
     question = {"version": VERSION, **({"add": add} if add is not None else {})}
-    answer = ask(transport, board, "gateway", msgpack.packb(question))
+    answer = ask(transport, board, "gateway", msgpack.packb(question), GatewayAnswer)
     if answer["refused"] is not None:
         raise UsageError(answer["refused"])
     found: list[dict[str, Any]] = answer["gateways"]

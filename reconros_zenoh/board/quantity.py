@@ -21,11 +21,15 @@ class Quantity(BaseModel):
     source: str = ""
 
     units: ClassVar[dict[str, float]] = {}
+    largest: ClassVar[float] = 1e18
+    """The most that is believed, in the first unit; of a time it is thirty years."""
 
     @model_validator(mode="after")
     def _unit_fits(self) -> Quantity:
         if self.unit not in self.units:
             raise ValueError(f"unknown unit {self.unit!r}: write one of {', '.join(self.units)}")
+        if self._scaled > self.largest:
+            raise ValueError(f"{self.value} {self.unit} is more than any board has")
         return self
 
     @property
@@ -83,6 +87,7 @@ class Size(Quantity):
     """A number of bytes."""
 
     units: ClassVar[dict[str, float]] = {"B": 1, "kB": 1e3, "KiB": 1024, "MB": 1e6, "MiB": 1 << 20}
+    largest: ClassVar[float] = 1e9
 
     @property
     def bytes(self) -> int:
@@ -125,3 +130,4 @@ class Count(Quantity):
 
     value: Annotated[int, Field(ge=1)]
     units: ClassVar[dict[str, float]] = {"1": 1}
+    largest: ClassVar[float] = 1e6

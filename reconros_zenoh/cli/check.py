@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.box import SIMPLE_HEAD
-from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from reconros_zenoh.cli.console import PlainConsole
 from reconros_zenoh.cli.options import AsJson
 from reconros_zenoh.project.build_cfg import read_build_cfg
 from reconros_zenoh.project.communication import check_topics
@@ -62,7 +62,7 @@ def check(
         return
     # What is read by another program must not have its names broken into lines.
     width = None if sys.stdout.isatty() else 200
-    console = Console(width=width, highlight=False, markup=False, emoji=False, soft_wrap=True)
+    console = PlainConsole(width=width, highlight=False, soft_wrap=True)
     _print(console, configuration)
     for warning in configuration.warnings:
         console.print(f"warning: {warning}", style="yellow")
@@ -128,7 +128,7 @@ def _slot(slot: HwSlot) -> dict[str, Any]:
     }
 
 
-def _print(console: Console, configuration: BuildConfiguration) -> None:
+def _print(console: PlainConsole, configuration: BuildConfiguration) -> None:
     facts = {
         "board": _board(configuration),
         "part": configuration.part,
@@ -189,7 +189,7 @@ def _print(console: Console, configuration: BuildConfiguration) -> None:
     )
 
 
-def _print_resources(console: Console, configuration: BuildConfiguration) -> None:
+def _print_resources(console: PlainConsole, configuration: BuildConfiguration) -> None:
     resources = configuration.resources
     nodes = (resource for resource in resources if resource.type == "rosnode")
     _table(console, "nodes", ("node", "group"), ((node.ros_name, node.group) for node in nodes))
@@ -219,7 +219,9 @@ def _print_resources(console: Console, configuration: BuildConfiguration) -> Non
     )
 
 
-def _table(console: Console, title: str, columns: Iterable[str], rows: Iterable[Iterable[object]]) -> None:
+def _table(
+    console: PlainConsole, title: str, columns: Iterable[str], rows: Iterable[Iterable[object]]
+) -> None:
     """Print a table unless it has no rows; numbers stand to the right."""
     content = [list(row) for row in rows]
     if not content:

@@ -2,22 +2,44 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Any
+
 import typer
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
+from rich.segment import Segment
 from rich.table import Table
 from rich.text import Text
+
+from reconros_zenoh.cli.printable import printable
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from rich.console import ConsoleOptions, RenderableType
 
 _COLUMNS = 80
 
 
-def wide_console(columns: int = _COLUMNS) -> Console:
+class PlainConsole(Console):
+    """A console on which names from elsewhere are only text: no markup, no emoji, no control characters."""
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__(markup=False, emoji=False, **options)
+
+    def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:
+        """Return what the console writes for a renderable."""
+        for segment in super().render(renderable, options):
+            yield segment if segment.control else Segment(printable(segment.text), segment.style)
+
+
+def wide_console(columns: int = _COLUMNS) -> PlainConsole:
     """Return stdout as a console that is never narrower than so many columns.
 
     The tables are laid out for 80. Squeezed into fewer they would lose digits; a narrow terminal breaks the
     lines itself and loses none.
     """
-    console = Console()
+    console = PlainConsole()
     console.width = max(console.width, columns)
     return console
 

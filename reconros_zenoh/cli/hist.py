@@ -61,9 +61,9 @@ def hist(
     for entry, other in pairs:
         print_histogram(console, entry, other, bins)
     if alone := [entry.name for entry, other in pairs if compare and not other]:
-        console.print(f"not in {compare}: {', '.join(alone)}", highlight=False, markup=False)
+        console.print(f"not in {compare}: {', '.join(alone)}", highlight=False)
     if png:
-        console.print(f"drawn to {png}", highlight=False, markup=False)
+        console.print(f"drawn to {png}", highlight=False)
 
 
 def _load(paths: list[Path]) -> list[NamedRecord]:

@@ -15,9 +15,11 @@ from pathlib import Path
 
 import typer
 
+from reconros_zenoh.cli.printable import printable
 from reconros_zenoh.errors import ReconrosError, TransportError, UsageError
 
 _FINISHING_S = 5.0
+_LONGEST_LINE = 2000
 
 _VERBS = {
     "demo": ("demo", "demo"),
@@ -53,7 +55,7 @@ def main() -> None:
     _open_closed_streams()
     if isinstance(sys.stdout, TextIOWrapper) and sys.stdout.errors == "strict":
         sys.stdout.reconfigure(errors="backslashreplace")  # a path may have what the terminal has not
-    logging.basicConfig(level=logging.INFO, format="%(levelname)s %(name)s: %(message)s")
+    _log_to_stderr()
     logging.getLogger("matplotlib").setLevel(logging.ERROR)  # where its fonts are is nobody's concern
     ending = _Ending()
     for number in (signal.SIGINT, signal.SIGTERM):
@@ -106,10 +108,27 @@ def _application(verbs: list[str]) -> typer.Typer:
 
 
 def _fail(error: ReconrosError, status: int) -> None:
-    print(f"reconros: {error}", file=sys.stderr)
+    print(f"reconros: {printable(str(error))}", file=sys.stderr)
     if "--json" in sys.argv:
         print(json.dumps({"error": str(error)}), flush=True)
     sys.exit(status)
+
+
+class Formatter(logging.Formatter):
+    """One line for each record, and nothing in it that a terminal would obey."""
+
+    def formatMessage(self, record: logging.LogRecord) -> str:  # noqa: N802 # as in the base
+        """Return the line of a record, cut where it is too long."""
+        text = super().formatMessage(record)
+        if len(text) > _LONGEST_LINE:
+            text = f"{text[: _LONGEST_LINE // 2]} ... {text[-_LONGEST_LINE // 2 :]}"
+        return printable(text, line_ends=False)
+
+
+def _log_to_stderr() -> None:
+    handler = logging.StreamHandler()
+    handler.setFormatter(Formatter("%(levelname)s %(name)s: %(message)s"))
+    logging.basicConfig(level=logging.INFO, handlers=[handler])
 
 
 def _drop_output() -> None:

@@ -16,6 +16,7 @@ from rich.text import Text
 from reconros_zenoh.board.profile import read_profile
 from reconros_zenoh.cli.console import wide_console
 from reconros_zenoh.cli.options import ENDPOINT, AsJson, Domain, Router
+from reconros_zenoh.cli.printable import printable
 from reconros_zenoh.errors import UsageError
 from reconros_zenoh.mapping.communication import Crossings, map_topics
 from reconros_zenoh.mapping.graph_file import read_graph_file
@@ -110,7 +111,7 @@ def map_communication(
         print(json.dumps(result))
         return
     for warning in result["warnings"]:
-        print(f"warning: {warning}", file=sys.stderr)
+        print(printable(f"warning: {warning}"), file=sys.stderr)
     _print(wide_console(), result, Crossings.of(graph, {name: each.mapping for name, each in rule.items()}))
     if plot:
         print(f"drawn to {plot}")
@@ -169,9 +170,7 @@ def _print(console: Console, result: Mapping[str, Any], crossings: Crossings) ->
 
 def _print_predictions(console: Console, result: Mapping[str, Any]) -> None:
     predicted = result["predicted"]
-    console.print(
-        f"\nBy the transfer times of {predicted['model']}:", style="bold", highlight=False, markup=False
-    )
+    console.print(f"\nBy the transfer times of {predicted['model']}:", style="bold", highlight=False)
     table = _table("topic", "rule", "predicted", "SMT HW/SW", "gateway HW/SW", "changeover", "reason")
     for topic in result["topics"]:
         prediction = topic["predicted"]

@@ -9,9 +9,9 @@ from contextlib import contextmanager
 from functools import partial
 from typing import TYPE_CHECKING, Self
 
-from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
+from reconros_zenoh.cli.console import PlainConsole
 from reconros_zenoh.experiments.roundtrip import CLIENTS
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ class ExperimentProgress:
 
     def __init__(self, plan: Plan, *, quiet: bool) -> None:
         self._plan = plan
-        self._console = Console(stderr=True, quiet=quiet)
+        self._console = PlainConsole(stderr=True, quiet=quiet)
         self._bars = _bars(self._console)
         self._tasks = {client: self._bars.add_task(client, total=plan.requests) for client in CLIENTS}
         self._left = 0
@@ -56,14 +56,14 @@ class ExperimentProgress:
 @contextmanager
 def run_bar(what: str, runs: int, *, quiet: bool, each: str = "runs") -> Iterator[Callable[[], None]]:
     """Show how many of the runs are done while the block runs; it calls what it is given after each."""
-    console = Console(stderr=True, quiet=quiet)
+    console = PlainConsole(stderr=True, quiet=quiet)
     if not console.is_interactive:
         console.print(f"{what}: {runs} {each} ...")
     with _bars(console) as bars:
         yield partial(bars.advance, bars.add_task(what, total=runs))
 
 
-def _bars(console: Console) -> Progress:
+def _bars(console: PlainConsole) -> Progress:
     """Return bars that show nothing where they cannot be redrawn."""
     return Progress(
         TextColumn("{task.description}"),

@@ -9,11 +9,11 @@ from pathlib import Path  # typer reads the annotations at run time
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.console import Console
 
 from deploy.compose import read_compose
 from deploy.state import StateFolder, running
 from deploy.supervisor import start_supervisor, supervise
+from reconros_zenoh.cli.console import PlainConsole
 from reconros_zenoh.cli.service_screen import ServiceScreen
 from reconros_zenoh.errors import ExperimentError, UsageError
 
@@ -88,8 +88,8 @@ def down(
         console.print(f"It had failed before: {record.error}")
 
 
-def _console(*, quiet: bool) -> Console:
-    return Console(highlight=False, markup=False, emoji=False, soft_wrap=True, quiet=quiet)
+def _console(*, quiet: bool) -> PlainConsole:
+    return PlainConsole(highlight=False, soft_wrap=True, quiet=quiet)
 
 
 def _the_one_running() -> Path | None:

@@ -54,7 +54,8 @@ class ComputationGraph:
     """A graph G = (N u T, E_pub u E_sub) with the node mapping (Mapping and Optimizing, Section 5).
 
     `notes` say what whoever read the graph left out or assumed. Raise GraphError for a topic that stands
-    twice, has no publisher, names an unknown node or one node twice, or has a size or rate of nothing.
+    twice, has no publisher, names an unknown node or one node twice, or has a size or rate of nothing,
+    and for a name that cannot be printed.
     """
 
     nodes: Mapping[str, Side]
@@ -62,6 +63,12 @@ class ComputationGraph:
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
+        named = [("nodes", name) for name in self.nodes] + [("topics", topic.name) for topic in self.topics]
+        for place in named:
+            if not place[1].isprintable():
+                raise GraphError(
+                    place, "has a name that cannot be printed.", "Take the control characters away."
+                )
         known: set[str] = set()
         for topic in self.topics:
             if topic.name in known:

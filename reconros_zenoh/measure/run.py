@@ -9,10 +9,12 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 from reconros_zenoh.errors import FileError
 from reconros_zenoh.measure.record import Record, read_record
+from reconros_zenoh.text_file import read_text_file
 
 if TYPE_CHECKING:
     from pathlib import Path
 
+_LIMIT_BYTES = 10_000_000
 _REMEDY = "Give the folder <out>/<clock> that an experiment wrote."
 
 
@@ -63,18 +65,16 @@ def load_run(folder: Path) -> tuple[dict[str, Any], dict[str, dict[str, Record]]
     """
     path = folder / "experiment.json"
     try:
-        experiment = json.loads(path.read_text(encoding="utf-8"))
+        experiment = json.loads(read_text_file(path, _REMEDY, _LIMIT_BYTES))
         _Experiment.model_validate(experiment)
-    except OSError as error:
-        raise FileError(path, None, f"cannot be read: {error.strerror}.", _REMEDY) from error
     except json.JSONDecodeError as error:
         raise FileError(path, error.lineno, f"is not JSON: {error.msg}.", _REMEDY) from error
-    except UnicodeDecodeError as error:
-        raise FileError(path, None, "is not a text file.", _REMEDY) from error
     except ValidationError as error:
         first = error.errors()[0]
         place = ".".join(map(str, first["loc"])) or "the file"
         raise FileError(path, None, f"is not an experiment: {place}: {first['msg']}.", _REMEDY) from error
+    except (RecursionError, ValueError) as error:  # nested by the thousand, a number of thousands of digits
+        raise FileError(path, None, f"is not an experiment: {error}.", _REMEDY) from error
     records = {
         mapping: {client: read_record(folder / mapping / f"{client}.csv") for client in clients}
         for mapping, clients in experiment["mappings"].items()

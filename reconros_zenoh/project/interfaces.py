@@ -20,9 +20,9 @@ _SEPARATORS = {"msg": 0, "srv": 1, "action": 2}
 # The forms of the ROS 2 interface definition language.
 _TYPE_NAME = re.compile(r"[A-Z][A-Za-z0-9]*")
 _FIELD_TYPE = re.compile(
-    r"(?P<primitive>bool|byte|char|float32|float64|u?int(?:8|16|32|64)|w?string(?:<=[0-9]+)?)?"
+    r"(?P<primitive>bool|byte|char|float32|float64|u?int(?:8|16|32|64)|w?string(?:<=[0-9]{1,9})?)?"
     r"(?(primitive)|(?:[a-z][a-z0-9_]*/)?[A-Z][A-Za-z0-9]*)"
-    r"(?P<array>\[(?:(?:<=)?[0-9]+)?\])?"
+    r"(?P<array>\[(?:(?:<=)?[0-9]{1,9})?\])?"
 )
 _SMALL_NAME = re.compile(r"(?!.*__)(?!.*_\Z)[a-z][a-z0-9_]*")
 _CONSTANT_NAME = re.compile(r"(?!.*__)(?!.*_\Z)[A-Z][A-Z0-9_]*")

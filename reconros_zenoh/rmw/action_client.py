@@ -27,7 +27,7 @@ class ActionEvent(NamedTuple):
 
     `kind` is "accepted" or "rejected", then "feedback" with the feedback as `message`, at the end "result"
     with the result and the goal's final `status`. "canceling" and "not canceling" answer a request to cancel;
-    "unanswered" means that the server did not answer at all.
+    "unanswered" means that the server did not answer at all, or with a status that does not exist.
     """
 
     kind: Literal["accepted", "rejected", "feedback", "result", "canceling", "not canceling", "unanswered"]
@@ -118,7 +118,7 @@ class ActionClient:
         request.goal_id.uuid[:] = list(goal_id)
 
         def on_response(response: Any) -> None:
-            if _missing(response):
+            if _missing(response) or response.status not in set(GoalStatus):
                 self._end(ActionEvent("unanswered", goal_id))
             else:
                 self._end(ActionEvent("result", goal_id, response.result, GoalStatus(response.status)))

@@ -23,6 +23,7 @@ STATUS_QOS = QosProfile(durability=Durability.TRANSIENT_LOCAL, depth=1)
 
 _SECOND_NS = 1_000_000_000
 _ENDED_KEPT = 100
+_MOST_WAITING = 100
 _NONE, _REJECTED, _UNKNOWN_GOAL, _TERMINATED = range(4)  # return codes of action_msgs/srv/CancelGoal
 
 
@@ -199,7 +200,11 @@ class ActionServer:
         goal_id = bytes(received.message.goal_id.uuid)
         with self._lock:
             if goal_id in self._goals and goal_id not in self._results:
-                self._waiting.setdefault(goal_id, []).append(responder)
+                waiting = self._waiting.setdefault(goal_id, [])
+                if len(waiting) < _MOST_WAITING:
+                    waiting.append(responder)
+                else:
+                    responder.fail(f"{_MOST_WAITING} requests wait for the result of this goal already")
                 return
             parts = self._results.get(goal_id)
         unknown = zero_message(self._type.get_result.response)

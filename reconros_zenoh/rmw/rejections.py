@@ -13,7 +13,8 @@ if TYPE_CHECKING:
     from reconros_zenoh.errors import BadMessageError
 
 _log = logging.getLogger(__name__)
-_SENDERS_KEPT = 10_000
+_SENDERS_NAMED = 100
+"""Of each reason: whoever is hostile can be a new sender with each message."""
 
 
 class Rejections:
@@ -22,7 +23,7 @@ class Rejections:
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._counts: Counter[str] = Counter()
-        self._logged: set[tuple[str, str]] = set()
+        self._named: dict[str, set[str]] = {}
 
     def add(self, key: str, sender: str | None, error: BadMessageError) -> None:
         """Count a refused message; log it when it is the first of its kind from this sender.
@@ -32,15 +33,17 @@ class Rejections:
         """
         with self._lock:
             self._counts[error.reason] += 1
-            first = (error.reason, sender or key)
-            if first in self._logged or len(self._logged) >= _SENDERS_KEPT:
+            named = self._named.setdefault(error.reason, set())
+            if (sender or key) in named or len(named) >= _SENDERS_NAMED:
                 return
-            self._logged.add(first)
+            named.add(sender or key)
+            is_last = len(named) == _SENDERS_NAMED
         _log.warning(
-            "refused a message on %s from %s (%s); more of its kind are counted only",
+            "refused a message on %s from %s (%s); more of its kind are counted only%s",
             key,
             f"publisher {sender}" if sender else "an unknown sender",
             error,
+            ", whoever sends them: no more senders are named" if is_last else "",
         )
 
     def counts(self) -> Mapping[str, int]:

@@ -155,12 +155,14 @@ def _definition(
     constants: Constdefs = []
     fields: Fielddefs = []
     for number, line in enumerate(lines, first_number):
+        if not line.strip():
+            continue
         if _WIDE_STRING.match(line):
             raise FileError(name, number, "wstring is not supported.", "Use string, which holds UTF-8.")
         try:
             # rosbags takes the names of messages only; the name says where `Type` without package is.
             ((more_constants, more_fields),) = get_types_from_msg(line, f"{package}/msg/Line").values()
-        except (TypesysError, AssertionError):
+        except (TypesysError, AssertionError, ValueError):  # the last for a number of thousands of digits
             raise FileError(
                 name,
                 number,

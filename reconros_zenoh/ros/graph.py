@@ -85,7 +85,8 @@ def parse(key: str) -> NodeToken | EndpointToken | None:
     taken of the key that was received.
     """
     admin_space, *parts = key.split("/")
-    if admin_space != _ADMIN_SPACE or "" in parts:
+    # What is not printable could tell a terminal what to do; no name of ROS 2 has such a character.
+    if admin_space != _ADMIN_SPACE or "" in parts or not key.isprintable():
         return None
     try:
         match parts:

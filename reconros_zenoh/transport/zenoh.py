@@ -358,7 +358,8 @@ class _Querier(_Declaration):
             payload = memoryview(sample.payload.to_bytes())
             self.call(on_reply, Reply(payload, _bytes(sample.attachment), None))
         elif (error := reply.err) is not None and not _is_timeout(reply, error):
-            self.call(on_reply, Reply(None, None, error.payload.to_string()))
+            text = error.payload.to_bytes().decode(errors="replace")
+            self.call(on_reply, Reply(None, None, text))
 
 
 def _bytes(value: zenoh.ZBytes | None) -> bytes | None:

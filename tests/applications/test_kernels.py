@@ -353,6 +353,13 @@ def test_load_digits_refuses_a_damaged_archive(tmp_path):
         mnist.load_digits(file)
 
 
+def test_load_digits_does_not_unpack_gigabytes(tmp_path, monkeypatch):
+    monkeypatch.setattr(mnist, "_LIMIT_BYTES", 1_000_000)
+    np.savez_compressed(tmp_path / "bomb.npz", images=np.zeros((3000, 28, 28), np.uint8), labels=LABELS)
+    with pytest.raises(FileError, match=r"bomb\.npz: unpacks to 2 MB"):
+        mnist.load_digits(tmp_path / "bomb.npz")
+
+
 def test_load_digits_names_a_missing_file(tmp_path):
     with pytest.raises(FileError, match=r"lost\.npz: cannot be read: No such file"):
         mnist.load_digits(tmp_path / "lost.npz")

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import struct
+import zlib
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from reconros_zenoh.board.bitstream import Bitstream, read_bitstreams
-from reconros_zenoh.errors import BitstreamError, UsageError
+from reconros_zenoh.errors import BitstreamError, FileError, UsageError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -133,6 +136,20 @@ def test_a_foreign_file(folder: Path, content: bytes) -> None:
     path = folder / "foreign.bit"
     path.write_bytes(content)
     assert refusal(lambda: Bitstream.read(path), path) == "is not a bitstream of this project."
+
+
+def test_a_name_that_is_no_text(tmp_path: Path) -> None:
+    path = tmp_path / SOBEL.file_name
+    header = struct.pack("<8sHHQ", b"RRZBIT01", 3, 5, 200)
+    body = b"\xff" * 5 + bytes(171)
+    path.write_bytes(header + struct.pack("<I", zlib.crc32(body, zlib.crc32(header))) + body)
+    assert "holds callback" in refusal(lambda: read_bitstreams(tmp_path, [SOBEL]), path)
+
+
+def test_a_pipe_is_not_waited_for(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / SOBEL.file_name)
+    with pytest.raises(FileError, match="it is a pipe"):
+        read_bitstreams(tmp_path, [SOBEL])
 
 
 @pytest.mark.parametrize(

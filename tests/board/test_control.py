@@ -272,8 +272,30 @@ def packed(content: object) -> Reply:
 
 
 def test_the_status_of_a_board_that_answers(monkeypatch: pytest.MonkeyPatch) -> None:
-    told = {"version": 1, "board": "board0"}
+    told = status(*board_that_ran())
     assert ask(packed(told), monkeypatch) == told
+
+
+@pytest.mark.parametrize(
+    "answer",
+    [
+        b"",
+        b"\x91" * 10_000,
+        b"\xdd\xff\xff\xff\xff",
+        b"\x81\x90\x01",
+        msgpack.packb([1]),
+        msgpack.packb({"version": 1}),
+        msgpack.packb({**status(*board_that_ran()), "slots": {}}),
+        msgpack.packb({**status(*board_that_ran()), "rejected": {"a": "b"}}),
+        msgpack.packb({**status(*board_that_ran()), "profile": "\x1b]0;mine\x07"}),
+        msgpack.packb({**status(*board_that_ran()), "rejected": {"\x1b[2J": 1}}),
+        msgpack.packb({**status(*board_that_ran()), "more": bytes(10_000_000)}),
+    ],
+    ids=range(11),
+)
+def test_what_is_no_status_is_said_to_be_none(answer: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(TransportError, match="board 'board0' answers with what is no status"):
+        ask(Reply(memoryview(answer), None, None), monkeypatch)
 
 
 @pytest.mark.parametrize("reply", [None, Reply(None, None, "no")], ids=["silence", "error"])

@@ -16,7 +16,8 @@ from small_board import (
     types,
 )
 
-from reconros_zenoh.board.control import VERSION, gateways
+from reconros_zenoh.board.answers import VERSION
+from reconros_zenoh.board.control import gateways
 from reconros_zenoh.board.executor import Executor
 from reconros_zenoh.board.gateway_control import GatewayServer, check_type
 from reconros_zenoh.board.hmt import Fifo, FifoPlan

@@ -120,7 +120,7 @@ OSIF = '[model.osif]\ncall = { value = 10, unit = "us", basis = "assumed" }\n'
 MISTAKES = {
     "not TOML": ("count = {", "count = = {", "count = = {", "is not TOML"),
     "not closed": ('name = "miniitx-zynq7100"', 'name = "miniitx', 'name = "miniitx', "is not TOML"),
-    "section missing": (OSIF, "", None, "model.osif: Field required"),
+    "section missing": (OSIF, "", "[model.cores]", "model.osif: Field required"),
     "name missing": ('name = "miniitx-zynq7100"\n', "", None, "name: Field required"),
     "key missing": (
         'call = { value = 10, unit = "us", basis = "assumed" }',

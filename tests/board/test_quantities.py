@@ -95,6 +95,9 @@ def test_the_smallest_and_the_largest(kind: type[Quantity], value: float, unit: 
         (Share, 1.01, "1"),
         (Count, 0, "1"),
         (Count, 1.5, "1"),
+        (Count, 10**4000, "1"),
+        (Duration, 1e308, "s"),
+        (Size, 1e308, "MiB"),
     ],
 )
 def test_values_that_cannot_be(kind: type[Quantity], value: object, unit: str) -> None:

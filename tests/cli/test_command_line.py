@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 import os
 import subprocess
 import sys
@@ -11,7 +12,7 @@ from typing import TYPE_CHECKING
 import pytest
 from typer.testing import CliRunner
 
-from reconros_zenoh.cli.main import _VERBS, _application
+from reconros_zenoh.cli.main import _VERBS, Formatter, _application
 from reconros_zenoh.errors import UsageError
 
 if TYPE_CHECKING:
@@ -91,6 +92,24 @@ def test_an_error_is_an_object_where_json_is_asked_for() -> None:
     (line,) = done.stderr.splitlines()
     assert (done.returncode, line) == (2, f"reconros: {json.loads(done.stdout)['error']}")
     assert "nowhere: cannot be read" in line
+
+
+def test_an_error_does_not_tell_the_terminal_what_to_do() -> None:
+    done = reconros("map \"$(printf '\\033]0;mine\\007.yaml')\"")
+    assert done.returncode == 2
+    assert done.stderr == (
+        "reconros: \\x1b]0;mine\\x07.yaml: cannot be read: No such file or directory. "
+        "Give a readable YAML file.\n"
+    )
+
+
+def test_a_log_line_is_one_line_without_control_characters() -> None:
+    text = "a\nWARNING b \x1b[2J" + 3000 * "x"
+    record = logging.LogRecord("a.b", logging.WARNING, "", 1, "refused %s", (text,), None)
+    line = Formatter("%(levelname)s %(message)s").format(record)
+    assert line.startswith(r"WARNING refused a\nWARNING b \x1b[2Jxxx")
+    assert line.isprintable()
+    assert 2000 < len(line) < 2050
 
 
 @pytest.mark.parametrize("words", ["--help", "hist {record}", "hist {record} --json", "check nowhere --json"])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import socket
 from contextlib import closing
 from http.client import HTTPConnection
 from typing import TYPE_CHECKING
@@ -77,6 +78,14 @@ def test_the_stream_ends_with_the_server_and_a_browser_that_goes_does_no_harm() 
         assert next_picture(streams[0]) == pytest.approx(255, abs=2)
     with closing(stays):
         assert streams[0].read() == b""
+
+
+def test_a_browser_that_is_gone_before_its_answer_is_no_error(server: PictureServer) -> None:
+    ours, gone = socket.socketpair()
+    gone.sendall(b"GET / HTTP/1.0\r\n\r\n")
+    gone.close()
+    with ours:
+        server._server.finish_request(ours, ("127.0.0.1", 0))
 
 
 def test_another_path_is_not_found(server: PictureServer) -> None:

@@ -62,5 +62,9 @@ def test_files_that_are_no_run_are_refused(write_run, board_records, tmp_path):
     with pytest.raises(FileError, match="is not an experiment: the file"):
         load_run(folder)
     (folder / "experiment.json").write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(FileError, match="not a text file"):
+    with pytest.raises(FileError, match="not UTF-8"):
         load_run(folder)
+    for endless in ("[" * 100_000, "9" * 5000):
+        (folder / "experiment.json").write_text(endless)
+        with pytest.raises(FileError, match="is not an experiment"):
+            load_run(folder)

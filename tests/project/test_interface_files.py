@@ -65,6 +65,7 @@ MISTAKES = {
     "bounded number": ("T.msg", "int32<=3 x\n", 1, "no type"),
     "three-part type": ("T.msg", "a/msg/B x\n", 1, "no type"),
     "capital field": ("T.msg", "uint32 x\nuint32 Data\n", 2, "'Data' is no name of a field"),
+    "endless array": ("T.msg", "uint8 a\nuint32[" + "9" * 5000 + "] x\n", 2, "no type"),
     "double underscore": ("T.msg", "uint32 a__b\n", 1, "no name of a field"),
     "trailing underscore": ("T.msg", "uint32 a_\n", 1, "no name of a field"),
     "small constant": ("T.msg", "uint32 red=1\n", 1, "no name of a constant"),

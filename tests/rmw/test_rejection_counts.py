@@ -50,12 +50,19 @@ def test_without_a_sender_the_key_stands_for_it(caplog: pytest.LogCaptureFixture
 def test_so_many_senders_that_no_more_are_logged(
     caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(rejections, "_SENDERS_KEPT", 2)
+    monkeypatch.setattr(rejections, "_SENDERS_NAMED", 2)
     refused = Rejections()
     for sender in ("aa", "bb", "cc", "dd"):
         refused.add("0/angle", sender, SHORT)
-    assert refused.counts() == {"truncated": 4}
-    assert len(messages(caplog)) == 2
+    refused.add("0/angle", "aa", FOREIGN)
+    assert refused.counts() == {"truncated": 4, "foreign_domain": 1}
+    first, last, other = messages(caplog)
+    assert first.endswith("counted only")
+    assert last.endswith(
+        "publisher bb (truncated: 7 bytes); more of its kind are counted only, whoever sends "
+        "them: no more senders are named"
+    )
+    assert "publisher aa (foreign_domain" in other
 
 
 def test_the_counts_do_not_change_behind_the_readers_back() -> None:

@@ -248,3 +248,29 @@ def test_every_goal_ends_once_however_things_interleave(steps: list[tuple[str, i
     results = [event.goal_id for event in case.events if event.kind == "result"]
     assert sorted(results) == sorted(ids)
     assert not case.server._waiting
+
+
+def test_a_result_with_a_status_that_does_not_exist_is_no_answer() -> None:
+    case = Case()
+    goal_id = case.send()
+    case.goals[0].outcome = 7  # type: ignore[assignment]
+    case.finish(case.goals[0], 1)
+    assert case.events[-1] == ActionEvent("unanswered", goal_id)
+
+
+def test_so_many_wait_for_a_result_that_no_more_may() -> None:
+    case = Case()
+    goal_id = case.send()
+    client = case.client_node.client(FIBONACCI.get_result, "fibonacci/_action/get_result")
+    answers: list[Any] = []
+    for _ in range(100):  # with the action client itself one too many
+        request = zero_message(FIBONACCI.get_result.request)
+        request.goal_id.uuid[:] = list(goal_id)
+        client.call(request, answers.append, 10**9)
+    case.sessions.settle()
+    assert [str(answer) for answer in answers] == [
+        "service /fibonacci/_action/get_result refused: 100 requests wait for the result of this goal already"
+    ]
+    case.finish(case.goals[0], 1)
+    assert len(answers) == 100
+    assert case.events[-1].kind == "result"

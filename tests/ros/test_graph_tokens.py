@@ -121,6 +121,7 @@ def test_round_trip(token: NodeToken | EndpointToken) -> None:
         STRING_PUBLISHER.removesuffix("/::,10:,:,:,,"),
         STRING_PUBLISHER.replace("::,10:", "::,ten:"),
         STRING_PUBLISHER + "/more",
+        STRING_PUBLISHER.replace("chatter", "\x1b]0;mine\x07"),
         STRING_PUBLISHER + "/backends:cpu:/more",
         "0/chatter/std_msgs::msg::dds_::String_/" + STRING_HASH,
     ],

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import functools
 import threading
+import zipfile
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -82,6 +83,9 @@ def load_digits(path: Path) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
     try:
         check_file(path, remedy, _LIMIT_BYTES)
         with path.open("rb") as file:
+            with zipfile.ZipFile(file) as packed:
+                _check_unpacked(path, packed, remedy)
+            file.seek(0)
             arrays = np.load(file, allow_pickle=False)
             images, labels = arrays["images"], arrays["labels"]
     except FileError:
@@ -101,3 +105,9 @@ def load_digits(path: Path) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
     if labels.max() > 9:
         raise FileError(path, None, f"labels holds {labels.max()}.", remedy)
     return images, labels
+
+
+def _check_unpacked(path: Path, packed: zipfile.ZipFile, remedy: str) -> None:
+    size = sum(member.file_size for member in packed.infolist())
+    if size > _LIMIT_BYTES:
+        raise FileError(path, None, f"unpacks to {size / 1e6:.0f} MB.", remedy)

@@ -1,0 +1,95 @@
+"""What a board answers, as it must look: anybody in the network can call itself a board."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+VERSION = 1
+
+# Names go to terminals, which obey what control characters say.
+_Text = Annotated[str, Field(pattern=r"^[^\x00-\x1f\x7f-\x9f]*$")]
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(strict=True, extra="allow", allow_inf_nan=False)
+
+
+class _Timing(_Part):
+    basis: _Text
+
+
+class _Callback(_Part):
+    kind: _Text
+    software: bool
+    slots: list[int]
+    timing: dict[_Text, _Timing]
+    calls: int
+    failed: int
+    dropped: int
+
+
+class _Slot(_Part):
+    id: int
+    holds: _Text | None
+    reconfigurations: int
+    reconfiguration_ms: float
+    busy_ms: float
+
+
+class _Publisher(_Part):
+    dropped: int
+
+
+class _Stream(_Part):
+    passed: int
+    dropped: int
+    waits: int
+
+
+class _Gateway(_Part):
+    name: _Text
+    hmt: _Text
+    smt: _Text
+    type: _Text
+    qos: dict[_Text, _Text | int]
+    slot: int
+    to_hmt: int
+    to_smt: int
+    late: int
+    dropped: int
+    refused: int
+
+
+class _Host(_Part):
+    overruns: int
+    overrun_ms: float
+    lag_p50_us: float | None
+    lag_p99_us: float | None
+
+
+class StatusAnswer(_Part):
+    """What `reconros/<board>/status` answers, see `board.control.status`."""
+
+    version: Literal[1]
+    board: _Text
+    profile: _Text
+    domain: int
+    executor: _Text
+    callbacks: dict[_Text, _Callback]
+    slots: list[_Slot]
+    publishers: dict[_Text, _Publisher]
+    gateways: list[_Gateway]
+    hmt: dict[_Text, _Stream]
+    spans_ms: dict[_Text, dict[_Text, float]]
+    rejected: dict[_Text, int]
+    host: _Host
+
+
+class GatewayAnswer(_Part):
+    """What `reconros/<board>/gateway` answers; `refused` says why none was added."""
+
+    version: Literal[1]
+    gateways: list[_Gateway]
+    refused: str | None
