@@ -23,14 +23,13 @@ def trips_of(frame_id: str, sec: int) -> tuple[list[RoundTrip], dict[str, int]]:
     network = SimulatedNetwork(environment)
     here, there = (Context(network.transport(name), 0, lambda: NOW_NS) for name in ("a1", "b2"))
     trips: list[RoundTrip] = []
-    viewer = Viewer(environment, here, types, trips.append, lambda _: None)
+    Viewer(environment, here, types, trips.append, lambda _: None)
     publisher = there.node("filter").publisher(types.message("sensor_msgs/msg/Image"), "/image_filtered")
     message = image_message(types, "bgr8", np.zeros(SHAPE, np.uint8))
     message.header.frame_id, message.header.stamp.sec = frame_id, sec
     environment.run(until=1)
     publisher.publish(message)
     environment.run(until=2)
-    viewer.close()
     return trips, dict(here.rejections.counts())
 
 
