@@ -54,6 +54,7 @@ class ClosedLoop:
         self._lost: list[int] = []
         self.warm = environment.event()
         exchange.open(node, types, self._arrive, self._match)
+        exchange.prepare(requests)
         self.done = environment.process(self._run())
 
     def _run(self) -> Generator[simpy.Event, object, None]:

@@ -34,6 +34,10 @@ class Exchange(ABC):
         """Declare the endpoints; `on_matching` is told whether somebody serves the requests."""
 
     @abstractmethod
+    def prepare(self, requests: int) -> None:
+        """Make the first `requests` requests and their answers, so that no round trip waits for that."""
+
+    @abstractmethod
     def ask(self, index: int, limit_ns: int) -> None:
         """Send request number `index`; nobody waits longer than `limit_ns` for its answer."""
 
@@ -86,13 +90,22 @@ class TopicExchange(Exchange):
             types.message(self.request_type), self.request_topic, on_matching=on_matching
         )
 
+    def prepare(self, requests: int) -> None:
+        """Encode the requests and compute the answers."""
+        for place in range(min(requests, len(self._inputs))):
+            self._encode(place)
+            self._expected(place)
+
     def ask(self, index: int, limit_ns: int) -> None:  # noqa: ARG002 - what was published cannot be given up
         """Publish request number `index`, counting round and round."""
-        place = index % len(self._inputs)
-        if place not in self._encoded:
+        self._publisher.publish_encoded((self._encode(index % len(self._inputs)),))
+
+    def _encode(self, place: int) -> bytes:
+        encoded = self._encoded.get(place)
+        if encoded is None:
             message = self.request(self._types, self._inputs[place])
-            self._encoded[place] = b"".join(self._publisher.message_type.encode(message))
-        self._publisher.publish_encoded((self._encoded[place],))
+            encoded = self._encoded[place] = b"".join(self._publisher.message_type.encode(message))
+        return encoded
 
     def is_right(self, index: int, answer: Any) -> bool:
         """Tell whether `answer` is the right one to request number `index`."""

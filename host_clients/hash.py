@@ -42,6 +42,9 @@ class HashExchange(Exchange):
         )
         on_matching(True)
 
+    def prepare(self, requests: int) -> None:
+        """Do nothing: there are no requests."""
+
     def ask(self, index: int, limit_ns: int) -> None:
         """Do nothing: the board's timer asks."""
 
