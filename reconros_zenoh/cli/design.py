@@ -8,12 +8,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.box import SIMPLE_HEAD
-from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
 from reconros_zenoh.board.profile import read_profile
-from reconros_zenoh.cli.console import interrupted, wide_console
+from reconros_zenoh.cli.console import PlainConsole, interrupted, wide_console
 from reconros_zenoh.cli.options import AsJson, ClockName, Out, Profile, Seed
 from reconros_zenoh.cli.progress import run_bar
 from reconros_zenoh.errors import UsageError
@@ -94,7 +93,7 @@ def design(
 
                 port = free_port() if view else None
                 if view:
-                    Console(stderr=True).print(f"the pictures are at http://127.0.0.1:{port}/")
+                    PlainConsole(stderr=True).print(f"the pictures are at http://127.0.0.1:{port}/")
                 run_design_wall(plan, endings, advance, port)
         experiment = finish(plan, endings, interrupted=interruption.happened)
         variants = experiment["variants"]
@@ -110,7 +109,7 @@ def design(
     raise typer.Exit(0 if all_right(experiment) else 1)
 
 
-def _print_table(console: Console, variants: Mapping[str, Mapping[str, Any]]) -> None:
+def _print_table(console: PlainConsole, variants: Mapping[str, Mapping[str, Any]]) -> None:
     table = Table(box=SIMPLE_HEAD, padding=0, show_edge=False)
     table.add_column("")
     for variant in variants:
