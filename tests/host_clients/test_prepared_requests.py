@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-import pytest
-
 from host_clients.closed_loop import ClosedLoop
 from host_clients.inverse import InverseExchange
 from host_clients.suite import exchange
@@ -16,6 +14,8 @@ from reconros_zenoh.ros.types import TypeRegistry
 from reconros_zenoh.transport.simulated import SimulatedNetwork
 
 if TYPE_CHECKING:
+    import pytest
+
     from reconros_zenoh.measure.record import RoundTrip
 
 
