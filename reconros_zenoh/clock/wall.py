@@ -147,7 +147,10 @@ class WallEnvironment(VirtualEnvironment):
             self.step()
 
     def _sleep(self, until_ns: float) -> None:
-        """Return at the time, or when there is something to do before it."""
+        """Return shortly before the time, or when there is something to do before it.
+
+        The caller looks again and again until then: what it does at the time is then in the caches.
+        """
         lead_ns = self._lead_ns
         while not self._inbox:
             early_ns = until_ns - time.monotonic_ns()
@@ -155,7 +158,7 @@ class WallEnvironment(VirtualEnvironment):
                 return
             if early_ns <= lead_ns:
                 time.sleep(0)  # lets other threads have the interpreter
-                continue
+                return
             self._asleep_until = until_ns
             # A thread whose turn ended before the line above could not see how long we sleep.
             if self._failure is not None or self.peek() < until_ns:
