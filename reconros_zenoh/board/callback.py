@@ -107,8 +107,9 @@ class InitData:
         """Tell whether all of an array, or of the block at an address, belongs to this message."""
         if not isinstance(source, np.ndarray):
             return self._placed is not None and self._placed.holds(source)
-        if any(getattr(self.message, name) is source for name, _ in reversed(self._type.fields)):
-            return True  # what callbacks read most, known without a look at where it lies
+        for name, _ in reversed(self._type.fields):
+            if getattr(self.message, name) is source:
+                return True  # what callbacks read most, known without a look at where it lies
         return any(lies_in(source, array) for array in self._arrays)
 
     @cached_property

@@ -54,7 +54,7 @@ class Timeline:
         other = Timeline(self._environment, self.started_ns)
         other._since_ns = self._since_ns
         other.callback = self.callback
-        other.stages_ns.update(self.stages_ns)
+        other.stages_ns = self.stages_ns.copy()
         return other
 
     @property

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Generator
+from types import GeneratorType
 from typing import TYPE_CHECKING, cast
 
 from reconros_zenoh.board.callback import HardwareThread, ThreadExit
@@ -13,6 +13,8 @@ from reconros_zenoh.clock.activity import PARK, Activity, Signal, limited
 from reconros_zenoh.executor.resource_mask import SOFTWARE
 
 if TYPE_CHECKING:
+    from collections.abc import Generator
+
     from reconros_zenoh.board.callback import HardwareImplementation
     from reconros_zenoh.board.endpoints import Event
     from reconros_zenoh.board.executor import Executor
@@ -148,7 +150,7 @@ class HardwareWorker(Worker):
         try:
             try:
                 steps = implementation.callback(thread)
-                if not isinstance(steps, Generator):
+                if not isinstance(steps, GeneratorType):
                     raise TypeError(
                         f"a hardware callback is a generator, this one returned {steps!r}. "
                         "Call what takes time with `yield from`."

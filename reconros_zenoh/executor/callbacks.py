@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections import defaultdict
 from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import TYPE_CHECKING, NamedTuple, Protocol
@@ -64,14 +65,13 @@ class Dispatch(NamedTuple):
 class CallbackList:
     """The callbacks of one kind in the order of registration.
 
-    Which of them could start now is kept as a set of bits, bit i for entry i, so that a search costs the same
-    for one callback and for hundreds.
+    `ready` says which of them a worker of a resource could start now: a set of bits, bit i for entry i, so
+    that a search costs the same for one callback and for hundreds.
     """
 
     def __init__(self) -> None:
         self._entries: list[CallbackEntry] = []
-        self._ready = 0
-        self._matching: dict[int, int] = {}
+        self.ready: defaultdict[int, int] = defaultdict(int)
 
     def __len__(self) -> int:
         return len(self._entries)
@@ -86,20 +86,17 @@ class CallbackList:
         """Register the entry at the end of the list."""
         entry.index = len(self._entries)
         self._entries.append(entry)
-        for resource in entry.mask.resources:
-            self._matching[resource] = self._matching.get(resource, 0) | 1 << entry.index
         self.refresh(entry)
 
     def refresh(self, entry: CallbackEntry) -> None:
         """Note whether the entry could start now: an event waits and it does not run already."""
+        bit = 1 << entry.index
         if not entry.running and entry.source.is_ready():
-            self._ready |= 1 << entry.index
+            for resource in entry.mask.implementations:
+                self.ready[resource] |= bit
         else:
-            self._ready &= ~(1 << entry.index)
-
-    def ready(self, resource: int) -> int:
-        """Return the set (bits) of entries that a worker of this resource could start now."""
-        return self._ready & self._matching.get(resource, 0)
+            for resource in entry.mask.implementations:
+                self.ready[resource] &= ~bit
 
 
 class CallbackLists(ABC):

@@ -58,13 +58,13 @@ class ReconrosExecutor(CallbackLists):
 
     def select(self, worker: object, resource: int) -> Dispatch | None:
         """Return the callback that this worker of `resource` must run now, or None when none is ready."""
-        timers = self._timers.ready(resource)
+        timers = self._timers.ready[resource]
         if timers:
             return self.take(self._timers[lowest(timers)], resource)
         offsets = self._offsets.get(worker)
         if offsets is None:
             offsets = self._offsets[worker] = OffsetVector(self)
-        ready = [entries.ready(resource) for entries in self._others]
+        ready = [entries.ready[resource] for entries in self._others]
         if not any(ready):
             offsets.wrap()
             return None

@@ -37,8 +37,3 @@ class ResourceMask:
 
     def __getitem__(self, resource: int) -> object:
         return self.implementations[resource]
-
-    @property
-    def resources(self) -> frozenset[int]:
-        """The resources whose field is filled."""
-        return frozenset(self.implementations)

@@ -26,7 +26,7 @@ class StandardExecutor(CallbackLists):
 
     def select(self, worker: object, resource: int) -> Dispatch | None:  # noqa: ARG002 - every worker is alike
         """Return the callback that a worker must run now, or None when none is ready."""
-        timers = self[CallbackKind.TMR].ready(resource)
+        timers = self[CallbackKind.TMR].ready[resource]
         if timers:
             return self.take(self[CallbackKind.TMR][lowest(timers)], resource)
         return self._from_ready_set(resource) or self._collect_and_select(resource)
@@ -34,7 +34,7 @@ class StandardExecutor(CallbackLists):
     def _from_ready_set(self, resource: int) -> Dispatch | None:
         for kind in _COLLECTED:
             # What was collected may have gone meanwhile: pushed out by a newer event.
-            serviceable = self._ready_set[kind] & self[kind].ready(resource)
+            serviceable = self._ready_set[kind] & self[kind].ready[resource]
             if serviceable:
                 index = lowest(serviceable)
                 self._ready_set[kind] &= ~(1 << index)
@@ -43,5 +43,5 @@ class StandardExecutor(CallbackLists):
 
     def _collect_and_select(self, resource: int) -> Dispatch | None:
         for kind in _COLLECTED:
-            self._ready_set[kind] = self[kind].ready(resource)
+            self._ready_set[kind] = self[kind].ready[resource]
         return self._from_ready_set(resource)

@@ -7,13 +7,6 @@ import pytest
 from reconros_zenoh.executor.resource_mask import SOFTWARE, ResourceMask
 
 
-def test_a_mask_names_the_resources_whose_field_is_filled() -> None:
-    assert ResourceMask.of(software="function", slots={0: "a.bit", 3: "b.bit"}).resources == {SOFTWARE, 0, 3}
-    assert ResourceMask.of(software="function").resources == {SOFTWARE}
-    assert ResourceMask.of(slots={2: "a.bit"}).resources == {2}
-    assert ResourceMask.of().resources == frozenset()
-
-
 def test_a_resource_is_in_the_mask_when_its_field_is_filled() -> None:
     mask = ResourceMask.of(slots={1: "a.bit"})
     assert 1 in mask
@@ -40,4 +33,4 @@ def test_a_mask_does_not_change_with_the_slots_it_was_made_from() -> None:
     slots = {0: "a.bit"}
     mask = ResourceMask.of(slots=slots)
     slots[1] = "b.bit"
-    assert mask.resources == {0}
+    assert 1 not in mask
