@@ -18,6 +18,7 @@ from board_daemon.hosting import BoardOptions, HostedBoard
 from reconros_zenoh.applications.gateway.nodes import random_body
 from reconros_zenoh.board.executor import Executor
 from reconros_zenoh.board.profile import read_profile
+from reconros_zenoh.clock.priority import prefer_this_process
 from reconros_zenoh.clock.virtual import succeed_once
 from reconros_zenoh.clock.wall import WallEnvironment, keep_time
 from reconros_zenoh.executor.callbacks import CallbackKind
@@ -53,34 +54,36 @@ class Receiver:
     def __init__(self, connection: Connection, readers: int) -> None:
         self._connection = connection
         self._readers = readers
-        self._receipts: list[Receipt] = []
-        self._bodies: list[tuple[Any, int]] = []
+        self._noted: list[tuple[str, Any, int]] = []
+        self._images: list[Any] = []
 
     def note(self, name: str, image: Any) -> None:
-        """Note that a subscriber has the message now."""
-        now_ns = time.monotonic_ns()
-        number, crc = image.header.frame_id.split()
-        if self._receipts and self._receipts[0][1] != int(number):
-            self._receipts.clear()  # of a message that others have lost
-        sent_ns = image.header.stamp.sec * _S + image.header.stamp.nanosec
-        self._receipts.append((name, int(number), now_ns - sent_ns))
-        self._bodies.append((image.data, int(crc, 16)))
-        if len(self._receipts) == self._readers:
-            receipts, self._receipts = self._receipts, []
-            self._connection.send(receipts)
+        """Note that a subscriber has the message now; the others wait meanwhile, so hardly more than that."""
+        self._noted.append((name, image, time.monotonic_ns()))
+        if len(self._noted) >= self._readers:
+            # Others may have lost the message before this one.
+            self._noted = [noted for noted in self._noted if noted[1].header == image.header]
+        if len(self._noted) == self._readers:
+            self._connection.send([_receipt(*noted) for noted in self._noted])
+            self._images += [image for _, image, _ in self._noted]
+            self._noted.clear()
 
     def check(self) -> None:
         """Answer with what is wrong with a body, or with nothing."""
-        bodies, self._bodies = self._bodies, []
-        wrong = [crc for body, crc in bodies if zlib.crc32(body) != crc]
-        self._connection.send(
-            f"{len(wrong)} of {len(bodies)} messages came with other bytes." if wrong else ""
-        )
+        images, self._images = self._images, []
+        wrong = sum(zlib.crc32(image.data) != int(image.header.frame_id.split()[1], 16) for image in images)
+        self._connection.send(f"{wrong} of {len(images)} messages came with other bytes." if wrong else "")
+
+
+def _receipt(name: str, image: Any, now_ns: int) -> Receipt:
+    sent_ns = image.header.stamp.sec * _S + image.header.stamp.nanosec
+    return name, int(image.header.frame_id.split()[0]), now_ns - sent_ns
 
 
 def run_board(connection: Connection, router: str, variant: Variant, count: int) -> None:
     """Be the board with so many hardware nodes."""
     begin_process()
+    prefer_this_process()
     environment = WallEnvironment()
     stop = environment.event()
     receiver = Receiver(connection, count)
@@ -133,7 +136,7 @@ def _run_hardware_nodes(receiver: Receiver, app: Application) -> None:
 def _hardware_node(
     receiver: Receiver, name: str, thread: HardwareThread
 ) -> Generator[Awaitable, object, None]:
-    image = yield from thread.get_init_data()
+    image = (yield from thread.get_init_data()).message
     yield from thread.mem_read(image.data)
     receiver.note(name, image)
 
