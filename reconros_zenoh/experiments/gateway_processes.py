@@ -62,7 +62,8 @@ class Receiver:
         self._noted.append((name, image, time.monotonic_ns()))
         if len(self._noted) >= self._readers:
             # Others may have lost the message before this one.
-            self._noted = [noted for noted in self._noted if noted[1].header == image.header]
+            last = image.header.frame_id
+            self._noted = [noted for noted in self._noted if noted[1].header.frame_id == last]
         if len(self._noted) == self._readers:
             self._connection.send([_receipt(*noted) for noted in self._noted])
             self._images += [image for _, image, _ in self._noted]

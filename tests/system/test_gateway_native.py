@@ -74,8 +74,10 @@ def test_a_receiver_reports_when_all_its_readers_have_a_message_and_checks_the_b
     receiver.check()
     assert here.recv() == ""
     receiver.note("a", image(3, "00000000"))
+    receiver.note("b", image(3, "00000000"))
+    assert here.recv()
     receiver.check()
-    assert here.recv() == "1 of 1 messages came with other bytes."
+    assert here.recv() == "2 of 2 messages came with other bytes."
 
 
 def test_too_many_lost_messages_end_the_experiment() -> None:
