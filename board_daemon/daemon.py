@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 from board_daemon.hosting import HostedBoard
 from reconros_zenoh.board.control import ControlServer, claim_name, status
 from reconros_zenoh.board.gateway_control import GatewayServer
-from reconros_zenoh.clock.priority import prefer_this_process
 from reconros_zenoh.clock.virtual import succeed_once
 from reconros_zenoh.clock.wall import WallEnvironment, ending_event, keep_time
 from reconros_zenoh.transport.memory import tune_memory
@@ -37,7 +36,6 @@ def run_board(
     name is taken.
     """
     keep_time()
-    prefer_this_process()
     tune_memory()
     environment = WallEnvironment()
     stop = ending_event(environment)

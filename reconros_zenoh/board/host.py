@@ -13,7 +13,6 @@ import numpy as np
 import xxhash
 
 from reconros_zenoh.board.thread_pool import ThreadPool
-from reconros_zenoh.clock.priority import yield_to_clock
 from reconros_zenoh.errors import CallbackLimitError
 from reconros_zenoh.ros.message_arrays import snapshot
 
@@ -127,7 +126,6 @@ class Host:
         future: Future[R] = Future()
 
         def run() -> None:
-            yield_to_clock()
             try:
                 future.set_result(function(*arguments))
             except (Exception, SystemExit) as error:  # noqa: BLE001 - handed to whoever asks for the result

@@ -11,8 +11,6 @@ from functools import partial
 from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
-from reconros_zenoh.clock.priority import yield_to_clock
-
 if TYPE_CHECKING:
     from collections.abc import Callable
 
@@ -66,7 +64,6 @@ class ThreadPool:
             _log.warning("%d computations have not ended; nobody waits for them any longer", left)
 
     def _work(self) -> None:
-        yield_to_clock()
         while (task := self._tasks.get()) is not None:
             future, function = task
             if future.set_running_or_notify_cancel():

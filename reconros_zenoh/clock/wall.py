@@ -182,12 +182,10 @@ def keep_time() -> None:
     """Make this process punctual; called once by a daemon before it starts any thread.
 
     Linux delays timers by up to 50 us to save wake-ups, and CPython hands the interpreter over every 5 ms
-    only. Not much more often than here, though: whoever waits for it looks that often, and with real-time
-    priority eight threads that look every 50 us kept the one that had it from both cores for 14 s. OpenCV
-    would keep other cores spinning for what is done sooner on one: a digit in 0.46 ms, not 0.49.
+    only. OpenCV would keep other cores spinning for what is done sooner on one: a digit in 0.46 ms, not 0.49.
     """
     os.environ.setdefault("OPENCV_FOR_THREADS_NUM", "1")  # read when it first computes
-    sys.setswitchinterval(0.0005)
+    sys.setswitchinterval(0.00005)
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PR_SET_TIMERSLACK, 1, 0, 0, 0)
 

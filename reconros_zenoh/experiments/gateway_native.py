@@ -45,10 +45,6 @@ _IN_SHARED_MEMORY = (
     "The publisher's copy is in shared memory: below 256 KiB Zenoh makes it, below 32 KiB the message goes "
     "through sockets."
 )
-_PRIORITY = (
-    "The board has real-time priority where this user may have it: its copies then come before that of the "
-    "software subscriber."
-)
 _THROUGH_SOCKETS = (
     "Messages go through sockets, which copy them several times more for each receiving process: shared "
     "memory is not used, because there is none or too little of it may be locked (see `ulimit -l`)."
@@ -66,8 +62,8 @@ Role: TypeAlias = "tuple[Callable[..., None], tuple[object, ...]]"
 
 
 def copies() -> list[str]:
-    """Return what is copied where and when, in sentences."""
-    return [*_COPIES, _IN_SHARED_MEMORY if has_shared_memory() else _THROUGH_SOCKETS, _PRIORITY]
+    """Return what is copied where, in sentences."""
+    return [*_COPIES, _IN_SHARED_MEMORY if has_shared_memory() else _THROUGH_SOCKETS]
 
 
 def measure_native(

@@ -18,7 +18,6 @@ from board_daemon.hosting import BoardOptions, HostedBoard
 from reconros_zenoh.applications.gateway.nodes import random_body
 from reconros_zenoh.board.executor import Executor
 from reconros_zenoh.board.profile import read_profile
-from reconros_zenoh.clock.priority import prefer_this_process
 from reconros_zenoh.clock.virtual import succeed_once
 from reconros_zenoh.clock.wall import WallEnvironment, keep_time
 from reconros_zenoh.executor.callbacks import CallbackKind
@@ -84,7 +83,6 @@ def _receipt(name: str, image: Any, now_ns: int) -> Receipt:
 def run_board(connection: Connection, router: str, variant: Variant, count: int) -> None:
     """Be the board with so many hardware nodes."""
     begin_process()
-    prefer_this_process()
     environment = WallEnvironment()
     stop = environment.event()
     receiver = Receiver(connection, count)
