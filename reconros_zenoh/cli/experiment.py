@@ -11,6 +11,7 @@ from rich.text import Text
 
 from reconros_zenoh.cli.console import interrupted, wide_console
 from reconros_zenoh.cli.design import design
+from reconros_zenoh.cli.driving import driving
 from reconros_zenoh.cli.gateway_experiment import gateway
 from reconros_zenoh.cli.options import AsJson, ClockName, Out, Profile, Seed
 from reconros_zenoh.cli.progress import ExperimentProgress
@@ -39,6 +40,7 @@ app.command("callbacks")(callbacks)
 app.command("reconfiguration")(reconfiguration)
 app.command("design")(design)
 app.command("gateway")(gateway)
+app.command("driving")(driving)
 
 MAPPINGS = ("all_software", "mixed", "all_hardware")
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Self
 from board_daemon.hosting import HostedBoard
 from host_clients.camera import Camera
 from host_clients.closed_loop import ClosedLoop
+from host_clients.robot import DrivingRobot
 from host_clients.scope import Scope
 from host_clients.suite import EXCHANGES, exchange
 from host_clients.viewer import Viewer
@@ -41,7 +42,7 @@ _exchange = lru_cache(maxsize=_SEEDS_KEPT * len(EXCHANGES))(exchange)
 
 
 class Simulation:
-    """Boards and clients in one event loop until all clients and cameras are done.
+    """Boards and clients in one event loop until all clients, cameras and robots are done.
 
     The same boards and clients, added in the same order, give the same round trips on any machine.
     What does not change is held once, whatever their number: message types, the requests of clients with one
@@ -112,6 +113,12 @@ class Simulation:
         self._done.append(camera.done)
         return camera
 
+    def add_robot(self, pictures: int) -> DrivingRobot:
+        """Return the robot of the driving example; it takes so many pictures."""
+        robot = DrivingRobot(self.environment, self.context(), self._types, pictures)
+        self._done.append(robot.done)
+        return robot
+
     def add_viewer(
         self,
         domain: int,
@@ -130,7 +137,7 @@ class Simulation:
         return Context(transport, domain, self.environment.clock_ns)
 
     def run(self) -> None:
-        """Return when all clients and cameras are done; raise TransportError when one is never answered."""
+        """Return when all that was added is done; raise TransportError when a client is never answered."""
         self.environment.run(until=self.environment.all_of(self._done))
 
 

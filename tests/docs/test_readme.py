@@ -32,6 +32,7 @@ SHORTER = {
     "experiment roundtrip": ("--requests", "2"),
     "experiment design": ("--seconds", "2"),
     "experiment callbacks": ("--repeat", "1"),
+    "experiment driving": ("--pictures", "20"),
     "experiment gateway": ("--repeat", "1", "--sizes", "10kB", "--subscribers", "2"),
     "simulate -f deploy/roundtrip.yaml": ("--requests", "1", "--boards", "2"),
     "calibrate": ("--evaluations", "2", "--requests", "20"),

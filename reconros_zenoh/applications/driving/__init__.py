@@ -1,0 +1,1 @@
+"""The driving example of Mapping and Optimizing Communication, Section 6: a robot that follows a lane."""

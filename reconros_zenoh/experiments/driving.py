@@ -1,0 +1,193 @@
+"""Section 6 of the gateways paper: a chain of nodes that drives a robot, its topics mapped in three steps."""
+
+from __future__ import annotations
+
+import csv
+import shutil
+import statistics
+import tempfile
+from dataclasses import dataclass
+from importlib.resources import as_file, files
+from itertools import pairwise
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from board_daemon.hosting import BoardOptions
+from host_clients.robot import RATE_HZ, Step
+from reconros_zenoh.applications.driving.chain import STATIONS, Chain
+from reconros_zenoh.applications.driving.kernels import LANE_WIDTH
+from reconros_zenoh.applications.driving.main import run_nodes
+from reconros_zenoh.errors import UsageError
+from reconros_zenoh.experiments.provenance import machine, provenance, writing
+from reconros_zenoh.experiments.simulation import Simulation
+from reconros_zenoh.mapping.apply import apply_mapping
+from reconros_zenoh.mapping.communication import TopicMapping, map_topics
+from reconros_zenoh.mapping.project_graph import read_project_graph
+from reconros_zenoh.project.loader import Project, read_project
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+    from reconros_zenoh.board.profile import Profile
+    from reconros_zenoh.project.loader import ProjectFiles
+
+T = TypeVar("T")
+
+VARIANTS: dict[str, frozenset[TopicMapping]] = {
+    "all_software": frozenset(),
+    "hardware_topics": frozenset({TopicMapping.HARDWARE}),
+    "gateways": frozenset({TopicMapping.HARDWARE, TopicMapping.GATEWAY}),
+}
+"""The steps of Section 5, by what of the communication mapping is written into the project."""
+
+SECTIONS = tuple(f"{here} to {there}" for here, there in pairwise(STATIONS))
+"""From one node having a picture to the next one having what was made of it."""
+
+_PAPER_MS = {"hardware_topics": (28.264, 3.21), "gateways": (20.270, 0.239)}
+"""Mean and standard deviation of the chain."""
+
+
+@dataclass(frozen=True, slots=True)
+class Drive:
+    """What came of one variant. By the picture's number: the chain's sections, and the way to the command.
+
+    The first picture is in neither: it waits until all slots are loaded.
+    """
+
+    steps: list[Step]
+    sections_ms: dict[int, list[float]]
+    loop_ms: dict[int, float]
+    unexpected: int
+
+    @property
+    def chain_ms(self) -> list[float]:
+        """How long the chain took for each picture."""
+        return [sum(sections) for sections in self.sections_ms.values()]
+
+
+def check_profile(profile: Profile) -> None:
+    """Raise UsageError for a profile without the times of topics inside a board."""
+    if profile.model is None or profile.model.topics is None or profile.model.hmt is None:
+        raise UsageError(
+            f"profile {profile.name!r} does not know what topics inside a board cost. Use --profile zcu104."
+        )
+
+
+def run_variant(profile: Profile, variant: str, pictures: int) -> Drive:
+    """Return the drive with so many pictures."""
+    files = _mapped_project(VARIANTS[variant])
+    with Simulation(files.types()) as simulation:
+        chain = Chain(simulation.environment.clock_ns)
+        project = Project(
+            files.folder, files.configuration, files.interfaces, lambda app: run_nodes(app, chain)
+        )
+        simulation.add_board(profile, project, project.mapping(None), BoardOptions())
+        robot = simulation.add_robot(pictures)
+        simulation.run()
+    return Drive(
+        robot.steps,
+        {number: [ns / 1e6 for ns in sections] for number, sections in _timed(chain.sections_ns())},
+        {number: ns / 1e6 for number, ns in _timed(robot.loop_ns)},
+        robot.unexpected,
+    )
+
+
+def summary(
+    profile: Profile, pictures: int, drives: Mapping[str, Drive], *, interrupted: bool
+) -> dict[str, Any]:
+    """Return the experiment's object."""
+    return {
+        "experiment": "driving",
+        "clock": "virtual",
+        "profile": profile.name,
+        "pictures": pictures,
+        "variants": {name: _variant(name, drive) for name, drive in drives.items()},
+        "anchors": anchors({name: statistics.fmean(drive.chain_ms) for name, drive in drives.items()}),
+        "interrupted": interrupted,
+        **provenance(),
+        "machine": machine(),
+    }
+
+
+def anchors(means_ms: Mapping[str, float]) -> list[dict[str, Any]]:
+    """Return what the paper measured of the chain beside these means, as far as they are there.
+
+    `error` is relative. Nothing of the model is fitted to it.
+    """
+    rows = {
+        f"chain, {name} [ms]": (paper_ms, means_ms[name])
+        for name, (paper_ms, _) in _PAPER_MS.items()
+        if name in means_ms
+    }
+    if len(rows) == len(_PAPER_MS):
+        slow, fast = rows.values()
+        rows["speedup by the gateway"] = (slow[0] / fast[0], slow[1] / fast[1])
+    return [
+        {"name": name, "paper": paper, "ours": ours, "error": ours / paper - 1}
+        for name, (paper, ours) in rows.items()
+    ]
+
+
+def all_right(experiment: Mapping[str, Any]) -> bool:
+    """Tell whether the robot was told what to do for each picture, kept its lane and heeded the light."""
+    return not experiment["interrupted"] and all(
+        variant["answered"] == experiment["pictures"] - 1
+        and not variant["unexpected"]
+        and variant["most_off_lane_mm"] < LANE_WIDTH / 2 * 1e3
+        and variant["stood_s"] > 0
+        for variant in experiment["variants"].values()
+    )
+
+
+def write_records(folder: Path, drives: Mapping[str, Drive]) -> None:
+    """Write each variant's pictures as rows of <variant>.csv."""
+    for name, drive in drives.items():
+        path = folder / f"{name}.csv"
+        with writing(path), path.open("w", newline="", encoding="utf-8") as file:
+            table = csv.writer(file)
+            table.writerow(("picture", *Step._fields, "loop_ms", *SECTIONS))
+            for number, step in enumerate(drive.steps):
+                sections = drive.sections_ms.get(number, [""] * len(SECTIONS))
+                table.writerow((number, *step, drive.loop_ms.get(number, ""), *sections))
+
+
+def _variant(name: str, drive: Drive) -> dict[str, Any]:
+    sections = zip(*drive.sections_ms.values(), strict=True)
+    paper_mean_ms, paper_sd_ms = _PAPER_MS.get(name, (None, None))
+    return {
+        "answered": len(drive.chain_ms),
+        "unexpected": drive.unexpected,
+        "chain_mean_ms": statistics.fmean(drive.chain_ms),
+        "chain_sd_ms": statistics.pstdev(drive.chain_ms),
+        "paper_mean_ms": paper_mean_ms,
+        "paper_sd_ms": paper_sd_ms,
+        "sections_ms": dict(zip(SECTIONS, map(statistics.fmean, sections), strict=True)),
+        "loop_median_ms": statistics.median(drive.loop_ms.values()),
+        "most_off_lane_mm": max(abs(step.off_lane) for step in drive.steps) * 1e3,
+        "stood_s": sum(step.speed == 0 for step in drive.steps) / RATE_HZ,
+    }
+
+
+def _mapped_project(applied: frozenset[TopicMapping]) -> ProjectFiles:
+    """Return the driving example with these of its topics mapped as `reconros map --apply` writes it."""
+    with (
+        as_file(files("reconros_zenoh.applications.driving")) as shipped,
+        tempfile.TemporaryDirectory() as folder,
+    ):
+        copy = Path(folder) / "driving"
+        shutil.copytree(shipped, copy)
+        project = read_project(copy)
+        decisions = map_topics(read_project_graph(project.configuration))
+        apply_mapping(
+            project.configuration,
+            None,
+            {
+                topic: decision.mapping if decision.mapping in applied else TopicMapping.SOFTWARE
+                for topic, decision in decisions.items()
+            },
+        )
+        return read_project(copy)
+
+
+def _timed(by_number: Mapping[str, T]) -> Iterator[tuple[int, T]]:
+    return ((int(number), value) for number, value in by_number.items() if number != "0")
