@@ -5,10 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from host_clients.image import image_message
+from host_clients.picture_source import PictureSource
 from reconros_zenoh.applications.design_example.picture import moving_picture
-from reconros_zenoh.clock.virtual import succeed_once
-from reconros_zenoh.errors import TransportError
 
 if TYPE_CHECKING:
     from collections.abc import Generator
@@ -40,7 +38,7 @@ class Camera:
     """Publishes pictures on /image_raw; `done` happens 2 s after the last, when it will have arrived.
 
     It begins once somebody subscribes and `start` has happened, and fails with TransportError when nobody
-    does. The header carries when a picture was sent (the context's clock) and, as frame_id, its number.
+    does.
     """
 
     def __init__(
@@ -53,38 +51,16 @@ class Camera:
     ) -> None:
         self.sent = 0
         self._environment = environment
-        self._types = types
         self._options = options
-        self._matched = environment.event()
-        self._node = context.node("camera")
-        self._publisher = self._node.publisher(
-            types.message("sensor_msgs/msg/Image"), "/image_raw", on_matching=self._match
-        )
+        self._source = PictureSource(environment, context.node("camera"), types)
         self.done = environment.process(self._run(start))
 
     def _run(self, start: simpy.Event) -> Generator[simpy.Event, object, None]:
         options = self._options
-        yield self._matched | self._environment.timeout(round(options.wait_s * _SECOND_NS))
-        if not self._matched.triggered:
-            raise TransportError(
-                f"nobody in domain {options.domain} subscribed to /image_raw within {options.wait_s:g} s. "
-                "Start a board that filters pictures, with the same --router and --domain."
-            )
+        yield from self._source.until_matched(options.wait_s)
         yield start
         for number in range(options.pictures):
-            self._publish(number)
+            self._source.publish(number, moving_picture(number))
+            self.sent += 1
             yield self._environment.timeout(round(_SECOND_NS / options.rate_hz))
         yield self._environment.timeout(_ON_THE_WAY_NS)
-
-    def _publish(self, number: int) -> None:
-        message = image_message(self._types, "bgr8", moving_picture(number))
-        seconds, nanoseconds = divmod(self._node.context.clock_ns(), _SECOND_NS)
-        message.header.stamp.sec, message.header.stamp.nanosec = seconds, nanoseconds
-        message.header.frame_id = str(number)
-        self._publisher.publish(message)
-        self.sent += 1
-
-    def _match(self, matching: bool) -> None:
-        """Note, on any thread, whether somebody subscribes."""
-        if matching:
-            self._environment.post(succeed_once, self._matched)

@@ -1,4 +1,4 @@
-"""Camera and viewer of the design example as processes: from their arguments until their end or a signal."""
+"""Camera, viewer and robot of the examples as processes: from their arguments until their end or a signal."""
 
 from __future__ import annotations
 
@@ -6,10 +6,13 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import cv2
+
 from host_clients.camera import Camera
 from host_clients.daemon import begin_process, gather
 from host_clients.gallery import Gallery
 from host_clients.picture_server import PictureServer
+from host_clients.robot import DrivingRobot
 from host_clients.scope import Scope
 from host_clients.viewer import Viewer
 from reconros_zenoh.measure.record import RecordWriter
@@ -25,6 +28,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from host_clients.camera import CameraOptions
+    from host_clients.robot import RobotOptions
     from reconros_zenoh.measure.record import RoundTrip
 
 
@@ -73,7 +77,9 @@ def run_viewer(options: ViewerOptions, on_ready: Callable[[str | None], None]) -
             for name in ("filter", "control")
             if options.out is not None
         }
-        server = None if options.view is None else closing.enter_context(PictureServer(options.view))
+        server = None
+        if options.view is not None:
+            server = closing.enter_context(PictureServer(options.view, "/image_filtered"))
 
         def record(name: str, kind: str) -> Callable[[RoundTrip], None]:
             def write(trip: RoundTrip) -> None:
@@ -97,3 +103,35 @@ def run_viewer(options: ViewerOptions, on_ready: Callable[[str | None], None]) -
     if options.out is not None:
         gallery.write(options.out, options.rate_hz)
     return counts
+
+
+def run_robot(options: RobotOptions, on_ready: Callable[[str | None], None]) -> DrivingRobot:
+    """Drive, and return the robot when its pictures are taken, or after SIGINT or SIGTERM.
+
+    `on_ready` gets the address of the page, None without one. The record is robot.csv. Raise TransportError
+    when there is no router or nobody subscribes within `wait_s`, UsageError when a file cannot be written.
+    """
+    environment, stop = begin_process()
+    with ExitStack() as closing:
+        transport = closing.enter_context(ZenohTransport.open(options.router))
+        record = server = None
+        if options.out is not None:
+            record = closing.enter_context(RecordWriter(options.out / "robot.csv"))
+        if options.view is not None:
+            server = closing.enter_context(PictureServer(options.view, "what the robot sees"))
+
+        def write(trip: RoundTrip) -> None:
+            if record is not None:
+                record.write(trip)
+
+        def show(picture: NDArray[np.uint8], speed: float) -> None:
+            if server is not None:
+                shown, font, white = picture.copy(), cv2.FONT_HERSHEY_SIMPLEX, (255, 255, 255)
+                cv2.putText(shown, f"{speed:.1f} m/s", (8, 470), font, 1, white, 2)
+                server.show(shown)
+
+        context = Context(transport, options.domain)
+        robot = DrivingRobot(environment, context, TypeRegistry(), options, write, show)
+        on_ready(None if server is None else server.url)
+        environment.run(until=robot.done | stop)
+    return robot

@@ -16,10 +16,10 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-_PAGE = b"""<!DOCTYPE html><html lang="en"><head><meta charset="utf-8"><title>/viewer</title>
-<style>body { background: #0f1318; color: #e6edf3; font: 16px system-ui, sans-serif; text-align: center; }
-img { width: min(90vw, 960px); }</style></head>
-<body><h1>/image_filtered</h1><img src="/stream" alt="the filtered picture, live"></body></html>
+_PAGE = """<!DOCTYPE html><html lang="en"><head><meta charset="utf-8"><title>{title}</title>
+<style>body {{ background: #0f1318; color: #e6edf3; font: 16px system-ui, sans-serif; text-align: center; }}
+img {{ width: min(90vw, 960px); }}</style></head>
+<body><h1>{title}</h1><img src="/stream" alt="{title}, live"></body></html>
 """
 _LOOK_S = 1.0
 
@@ -27,10 +27,12 @@ _LOOK_S = 1.0
 class PictureServer:
     """Serves what `show` was given last, as a page with a motion JPEG, at `url`, until closed.
 
-    It listens on 127.0.0.1 only; port 0 takes a free one. Raises UsageError when the port is taken.
+    It listens on 127.0.0.1 only; port 0 takes a free one. The title is the heading of the page. Raises
+    UsageError when the port is taken.
     """
 
-    def __init__(self, port: int) -> None:
+    def __init__(self, port: int, title: str) -> None:
+        self._page = _PAGE.format(title=title).encode()
         self._changed = threading.Condition()
         self._jpeg = b""
         self._number = 0
@@ -77,6 +79,8 @@ class PictureServer:
             return None if self._closed else (self._number, self._jpeg)
 
     def _handler(self) -> type[BaseHTTPRequestHandler]:
+        page = self._page
+
         class Handler(BaseHTTPRequestHandler):
             pictures = self
 
@@ -89,7 +93,7 @@ class PictureServer:
                 """Answer with the page or the stream."""
                 if self.path == "/":
                     self._begin("text/html; charset=utf-8")
-                    self.wfile.write(_PAGE)
+                    self.wfile.write(page)
                 elif self.path == "/stream":
                     self._begin("multipart/x-mixed-replace; boundary=picture")
                     self._stream()

@@ -2,26 +2,43 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from host_clients.image import image_message
+from host_clients.picture_source import PictureSource
 from reconros_zenoh.applications.driving.world import Robot, World, is_red
-from reconros_zenoh.clock.virtual import succeed_once
-from reconros_zenoh.errors import TransportError
+from reconros_zenoh.errors import BadMessageError
+from reconros_zenoh.measure.record import RoundTrip
 
 if TYPE_CHECKING:
-    from collections.abc import Generator
+    from collections.abc import Callable, Generator
+    from pathlib import Path
 
+    import numpy as np
     import simpy
+    from numpy.typing import NDArray
 
     from reconros_zenoh.clock.virtual import VirtualEnvironment
     from reconros_zenoh.rmw.node import Context
+    from reconros_zenoh.rmw.received import Received
     from reconros_zenoh.ros.types import TypeRegistry
 
 RATE_HZ = 10.0
 _SECOND_NS = 1_000_000_000
-_WAIT_NS = 30 * _SECOND_NS
 _ON_THE_WAY_NS = 2 * _SECOND_NS
+_FASTEST = 10.0
+
+
+@dataclass(frozen=True, slots=True)
+class RobotOptions:
+    """What a robot is told: where its record goes, and the port of its page, if there are any."""
+
+    router: str
+    pictures: int
+    out: Path | None = None
+    view: int | None = None
+    wait_s: float = 30.0
+    domain: int = 0
 
 
 class Step(NamedTuple):
@@ -36,66 +53,76 @@ class Step(NamedTuple):
 
 
 class DrivingRobot:
-    """Publishes pictures on /image_raw and does what comes on /drive.
+    """Publishes ten pictures a second on /image_raw, and does what comes on /drive.
 
-    It begins once somebody subscribes, and fails with TransportError when nobody does within 30 s. `done`
-    happens 2 s after the last picture, when its command will have come. `loop_ns` says for each picture that
-    was answered how long after it the command came; `unexpected` counts commands for no such picture.
+    It begins once somebody subscribes, and fails with TransportError when nobody does. `done` happens 2 s
+    after the last picture. `on_trip` gets for each picture how long it took until its command was here; those
+    without one are `lost` at the end. `unexpected` counts commands for no picture of this robot.
     """
 
     def __init__(
-        self, environment: VirtualEnvironment, context: Context, types: TypeRegistry, pictures: int
+        self,
+        environment: VirtualEnvironment,
+        context: Context,
+        types: TypeRegistry,
+        options: RobotOptions,
+        on_trip: Callable[[RoundTrip], None],
+        on_picture: Callable[[NDArray[np.uint8], float], None] = lambda *_: None,
     ) -> None:
+        """`on_picture` gets each picture, and the speed at which it was taken."""
         self.steps: list[Step] = []
-        self.loop_ns: dict[str, int] = {}
         self.unexpected = 0
         self._environment = environment
-        self._types = types
-        self._pictures = pictures
+        self._options = options
+        self._on_trip = on_trip
+        self._on_picture = on_picture
         self._robot = Robot()
         self._world = World()
         self._moved_ns = environment.now
         self._taken_ns: dict[str, int] = {}
-        self._matched = environment.event()
-        node = context.node("robot")
-        self._publisher = node.publisher(
-            types.message("sensor_msgs/msg/Image"), "/image_raw", on_matching=self._match
+        self._node = context.node("robot")
+        self._node.subscription(
+            types.message("geometry_msgs/msg/TwistStamped"), "/drive", self._arrive, check=_check
         )
-        node.subscription(
-            types.message("geometry_msgs/msg/TwistStamped"),
-            "/drive",
-            lambda received: environment.post(self._obey, received.message),
-        )
+        self._source = PictureSource(environment, self._node, types)  # it may match at once
         self.done = environment.process(self._run())
 
+    @property
+    def unanswered(self) -> int:
+        """How many pictures have no command yet."""
+        return len(self._taken_ns)
+
     def _run(self) -> Generator[simpy.Event, object, None]:
-        yield self._matched | self._environment.timeout(_WAIT_NS)
-        if not self._matched.triggered:
-            raise TransportError("nobody subscribed to /image_raw. Start a board with the driving example.")
-        started_ns = self._environment.now
-        for number in range(self._pictures):
-            self._take_picture(str(number), (self._environment.now - started_ns) / _SECOND_NS)
+        options = self._options
+        yield from self._source.until_matched(options.wait_s)
+        for number in range(options.pictures):
+            self._take_picture(number)
             yield self._environment.timeout(round(_SECOND_NS / RATE_HZ))
         yield self._environment.timeout(_ON_THE_WAY_NS)
+        for unanswered in self._taken_ns:
+            self._on_trip(RoundTrip(int(unanswered), None, "lost"))
 
-    def _take_picture(self, number: str, seconds: float) -> None:
+    def _take_picture(self, number: int) -> None:
         self._move()
-        robot = self._robot
+        robot, seconds = self._robot, number / RATE_HZ
         self.steps.append(Step(seconds, robot.x, robot.y, robot.off_lane, robot.speed, is_red(seconds)))
-        message = image_message(self._types, "bgr8", self._world.picture(robot, seconds, int(number)))
-        self._taken_ns[number] = now_ns = self._environment.now
-        message.header.stamp.sec, message.header.stamp.nanosec = divmod(now_ns, _SECOND_NS)
-        message.header.frame_id = number
-        self._publisher.publish(message)
+        picture = self._world.picture(robot, seconds, number)
+        self._taken_ns[str(number)] = self._source.publish(number, picture)
+        self._on_picture(picture, robot.speed)
 
-    def _obey(self, command: Any) -> None:
-        taken_ns = self._taken_ns.pop(command.header.frame_id, None)
+    def _arrive(self, received: Received) -> None:
+        """Note, on any thread, that a command has come."""
+        self._environment.post(self._obey, received.message, self._node.context.clock_ns())
+
+    def _obey(self, command: Any, arrived_ns: int) -> None:
+        number = command.header.frame_id
+        taken_ns = self._taken_ns.pop(number, None)
         if taken_ns is None:
             self.unexpected += 1
             return
-        self.loop_ns[command.header.frame_id] = self._environment.now - taken_ns
         self._move()
         self._robot.speed, self._robot.turn = command.twist.linear.x, command.twist.angular.z
+        self._on_trip(RoundTrip(int(number), arrived_ns - taken_ns, "ok"))
 
     def _move(self) -> None:
         """Let the robot go on as it was told until now."""
@@ -103,7 +130,9 @@ class DrivingRobot:
         self._robot.move((now_ns - self._moved_ns) / _SECOND_NS)
         self._moved_ns = now_ns
 
-    def _match(self, matching: bool) -> None:
-        """Note, on any thread, whether somebody subscribes."""
-        if matching:
-            self._environment.post(succeed_once, self._matched)
+
+def _check(command: Any) -> None:
+    """Raise BadMessageError for what no robot can do."""
+    for name, value in (("speed", command.twist.linear.x), ("turn", command.twist.angular.z)):
+        if not abs(value) <= _FASTEST:
+            raise BadMessageError(name, f"the {name} is {value}, beyond {_FASTEST:g} m/s and rad/s")

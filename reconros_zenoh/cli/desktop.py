@@ -1,7 +1,8 @@
-"""`reconros camera` and `reconros viewer`: the desktop of the design example."""
+"""`reconros camera`, `viewer` and `robot`: the desktops of the examples."""
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -14,15 +15,29 @@ Rate = Annotated[
     typer.Option(min=0.1, max=1000, metavar="HZ", help="How many pictures per second the camera takes."),
 ]
 
+Pictures = Annotated[int, typer.Option(min=1, help="How many pictures to publish.")]
+Wait = Annotated[
+    float, typer.Option(min=0.1, max=86400, metavar="SECONDS", help="How long to wait for a subscriber.")
+]
+View = Annotated[
+    int | None,
+    typer.Option(
+        min=0,
+        max=65535,
+        metavar="PORT",
+        envvar="RECONROS_VIEW",
+        help="Show the pictures in the browser, at this port of 127.0.0.1; 0 takes a free one.",
+        show_default=False,
+    ),
+]
+
 
 def camera(
-    pictures: Annotated[int, typer.Option(min=1, help="How many pictures to publish.")] = 100,
+    pictures: Pictures = 100,
     rate: Rate = 5.0,
     router: Router = ENDPOINT,
     domain: Domain = 0,
-    wait: Annotated[
-        float, typer.Option(min=0.1, max=86400, metavar="SECONDS", help="How long to wait for a subscriber.")
-    ] = 30.0,
+    wait: Wait = 30.0,
     group: Group = None,
     members: Members = 1,
 ) -> None:
@@ -51,17 +66,7 @@ def viewer(
             show_default=False,
         ),
     ] = None,
-    view: Annotated[
-        int | None,
-        typer.Option(
-            min=0,
-            max=65535,
-            metavar="PORT",
-            envvar="RECONROS_VIEW",
-            help="Show the pictures in the browser, at this port of 127.0.0.1; 0 takes a free one.",
-            show_default=False,
-        ),
-    ] = None,
+    view: View = None,
     group: Group = None,
     members: Members = 1,
 ) -> None:
@@ -71,11 +76,36 @@ def viewer(
     """
     from host_clients.desktop import ViewerOptions, run_viewer
 
-    def tell(url: str | None) -> None:
-        print("viewer: ready" + (f", the pictures are at {url}" if url else ""), flush=True)
-
-    counts = run_viewer(ViewerOptions(router, out, view, rate, domain, group, members), tell)
+    options = ViewerOptions(router, out, view, rate, domain, group, members)
+    counts = run_viewer(options, partial(_tell, "viewer"))
     print(
         f"viewer: {counts['pictures']} filtered pictures and {counts['indices']} servo indices came",
         flush=True,
     )
+
+
+def robot(
+    pictures: Pictures = 300,
+    router: Router = ENDPOINT,
+    domain: Domain = 0,
+    wait: Wait = 30.0,
+    out: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Where robot.csv goes.", show_default=False)
+    ] = None,
+    view: View = None,
+) -> None:
+    """Be the robot of the driving example: pictures on /image_raw, ten a second, and do what comes on /drive.
+
+    It ends 2 s after the last picture. robot.csv has the times from picture to command.
+    """
+    from host_clients.desktop import run_robot
+    from host_clients.robot import RobotOptions
+
+    driven = run_robot(RobotOptions(router, pictures, out, view, wait, domain), partial(_tell, "robot"))
+    answered = len(driven.steps) - driven.unanswered
+    print(f"robot: {len(driven.steps)} pictures published, {answered} answered", flush=True)
+    raise typer.Exit(0 if driven.done.triggered else 130)
+
+
+def _tell(name: str, url: str | None) -> None:
+    print(f"{name}: ready" + (f", the pictures are at {url}" if url else ""), flush=True)

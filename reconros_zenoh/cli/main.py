@@ -34,6 +34,7 @@ _VERBS = {
     "client": ("daemons", "client"),
     "camera": ("desktop", "camera"),
     "viewer": ("desktop", "viewer"),
+    "robot": ("desktop", "robot"),
     "status": ("daemons", "status"),
     "new": ("new", "new"),
     "check": ("check", "check"),

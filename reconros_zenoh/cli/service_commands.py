@@ -14,6 +14,7 @@ from deploy.compose import Condition, read_compose
 from host_clients.camera import CameraOptions
 from host_clients.daemon import ClientOptions
 from host_clients.desktop import ViewerOptions
+from host_clients.robot import RobotOptions
 from reconros_zenoh.board.profile import read_profile
 from reconros_zenoh.cli import daemons, desktop
 from reconros_zenoh.errors import FileError, UsageError
@@ -34,16 +35,17 @@ _VERBS: dict[str, Callable[..., None]] = {
     "client": daemons.client,
     "camera": desktop.camera,
     "viewer": desktop.viewer,
+    "robot": desktop.robot,
     "router": daemons.router,
 }
 
 
 def read_deployment(path: Path, environment: Mapping[str, str]) -> DeploymentPlan:
-    """Return the boards, clients, cameras and viewers of a Compose file; nothing is started.
+    """Return the boards, clients, cameras, viewers and robots of a Compose file; nothing is started.
 
     FileError names the service whose command cannot be simulated: another one than `reconros board`,
-    `client`, `camera`, `viewer` and `router`, options that these would refuse, a profile without modelled
-    times, a client or camera without a board.
+    `client`, `camera`, `viewer`, `robot` and `router`, options that these would refuse, a profile without
+    modelled times, a client, camera or robot without a board.
     """
     services = read_compose(path, environment).services
     nodes = Node.read(path, environment).mapping()["services"].mapping()
@@ -53,6 +55,7 @@ def read_deployment(path: Path, environment: Mapping[str, str]) -> DeploymentPla
     clients: dict[str, ClientOptions] = {}
     cameras: dict[str, CameraOptions] = {}
     viewers: dict[str, ViewerOptions] = {}
+    robots: dict[str, RobotOptions] = {}
     for name, service in services.items():
         command = nodes[name].mapping()["command"]
         if Condition.COMPLETED in service.depends_on.values():
@@ -84,7 +87,11 @@ def read_deployment(path: Path, environment: Mapping[str, str]) -> DeploymentPla
             )
         elif verb == "viewer":
             viewers[name] = ViewerOptions(given["router"], domain=given["domain"])
-    plan = DeploymentPlan(boards, clients, cameras, viewers)
+        elif verb == "robot":
+            robots[name] = RobotOptions(
+                given["router"], given["pictures"], wait_s=given["wait"], domain=given["domain"]
+            )
+    plan = DeploymentPlan(boards, clients, cameras, viewers, robots)
     _check_clients(plan, nodes)
     return plan
 
@@ -152,11 +159,12 @@ def _parser(verb: str) -> Any:
 
 
 def _check_clients(plan: DeploymentPlan, nodes: Mapping[str, Node]) -> None:
-    """Raise FileError for a client or camera that could never begin, and when there is none."""
-    if not plan.clients and not plan.cameras:
+    """Raise FileError for a client, camera or robot that could never begin, and when there is none."""
+    if not (plan.clients or plan.cameras or plan.robots):
         raise next(iter(nodes.values())).error("and the others are no clients.", "Add a `reconros client`.")
     domains = {name: client.domain for name, client in plan.clients.items()}
     domains |= {name: camera.domain for name, camera in plan.cameras.items()}
+    domains |= {name: robot.domain for name, robot in plan.robots.items()}
     for name, domain in domains.items():
         if not plan.place(domain):
             raise (

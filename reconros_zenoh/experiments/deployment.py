@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from host_clients.camera import CameraOptions
     from host_clients.daemon import ClientOptions
     from host_clients.desktop import ViewerOptions
+    from host_clients.robot import RobotOptions
     from reconros_zenoh.board.profile import Profile
     from reconros_zenoh.measure.record import RoundTrip
     from reconros_zenoh.project.loader import Project
@@ -37,12 +38,13 @@ class BoardPlan:
 
 @dataclass(frozen=True, slots=True)
 class DeploymentPlan:
-    """The boards, clients, cameras and viewers of a deployment, each by the name of its service."""
+    """The boards, clients, cameras, viewers and robots of a deployment, by the names of their services."""
 
     boards: Mapping[str, BoardPlan]
     clients: Mapping[str, ClientOptions]
     cameras: Mapping[str, CameraOptions]
     viewers: Mapping[str, ViewerOptions]
+    robots: Mapping[str, RobotOptions]
 
     def changed(self, requests: int | None, seed: int | None) -> DeploymentPlan:
         """Return the same with another number of requests or pictures and another seed, where given."""
@@ -65,7 +67,11 @@ class DeploymentPlan:
             service: replace(camera, pictures=requests or camera.pictures)
             for service, camera in self.cameras.items()
         }
-        return DeploymentPlan(boards, clients, cameras, self.viewers)
+        robots = {
+            service: replace(robot, pictures=requests or robot.pictures)
+            for service, robot in self.robots.items()
+        }
+        return DeploymentPlan(boards, clients, cameras, self.viewers, robots)
 
     def clone(self, number: int) -> DeploymentPlan:
         """Return the same with `-number` behind the names of the boards.
@@ -90,19 +96,21 @@ class DeploymentRun:
     """Deployments that run beside each other, each on a network of its own.
 
     `round_trips` holds those of each client, by the names of board and service; those of a viewer are the
-    pictures, and those of its control loop have the name of its service with `_control` behind it.
+    pictures, and those of its control loop have the name of its service with `_control` behind it; those of a
+    robot are from picture to command.
     """
 
     def __init__(self, plans: Sequence[DeploymentPlan]) -> None:
         self._plans = plans
         self.requests = sum(client.requests for plan in plans for client in plan.clients.values())
         self.requests += sum(camera.pictures for plan in plans for camera in plan.cameras.values())
+        self.requests += sum(robot.pictures for plan in plans for robot in plan.robots.values())
         self.round_trips: dict[str, dict[str, list[RoundTrip]]] = {}
         self.simulated_ns = 0
         self._may_lose: set[str] = set()
 
     def run(self, on_round_trip: Callable[[], None]) -> None:
-        """Return when all clients and cameras are done; raise UsageError or TransportError otherwise."""
+        """Return when all that was added is done; raise UsageError or TransportError otherwise."""
         with Simulation(TypeRegistry()) as simulation:
             for plan in self._plans:
                 simulation.begin_network()
@@ -112,13 +120,12 @@ class DeploymentRun:
                     except UsageError as error:
                         raise UsageError(f"{service}: {error}") from error
                 for service, client in plan.clients.items():
-                    trips = self.round_trips.setdefault(plan.place(client.domain), {}).setdefault(service, [])
-
-                    def record(round_trip: RoundTrip, trips: list[RoundTrip] = trips) -> None:
-                        trips.append(round_trip)
-                        on_round_trip()
-
+                    record = self._record(plan.place(client.domain), service, on_round_trip)
                     simulation.add_client(client, record)
+                for service, robot in plan.robots.items():
+                    record = self._record(plan.place(robot.domain), service, on_round_trip)
+                    simulation.add_robot(robot, record)
+                    self._may_lose.add(service)
                 for service, viewer in plan.viewers.items():
                     pictures, indices = (
                         self.round_trips.setdefault(plan.place(viewer.domain), {}).setdefault(name, [])
@@ -134,6 +141,17 @@ class DeploymentRun:
                 simulation.run()
             finally:
                 self.simulated_ns = simulation.environment.now
+
+    def _record(
+        self, place: str, service: str, on_round_trip: Callable[[], None]
+    ) -> Callable[[RoundTrip], None]:
+        trips = self.round_trips.setdefault(place, {}).setdefault(service, [])
+
+        def record(round_trip: RoundTrip) -> None:
+            trips.append(round_trip)
+            on_round_trip()
+
+        return record
 
     def all_right(self) -> bool:
         """Tell whether every answer came and was right; pictures, sent with best effort, may be lost."""

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 from importlib.resources import as_file, files
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 from board_daemon.hosting import BoardOptions
-from host_clients.robot import RATE_HZ, Step
+from host_clients.robot import RATE_HZ, RobotOptions, Step
 from reconros_zenoh.applications.driving.chain import STATIONS, Chain
 from reconros_zenoh.applications.driving.kernels import LANE_WIDTH
 from reconros_zenoh.applications.driving.main import run_nodes
@@ -26,12 +26,11 @@ from reconros_zenoh.mapping.project_graph import read_project_graph
 from reconros_zenoh.project.loader import Project, read_project
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Mapping
 
     from reconros_zenoh.board.profile import Profile
+    from reconros_zenoh.measure.record import RoundTrip
     from reconros_zenoh.project.loader import ProjectFiles
-
-T = TypeVar("T")
 
 VARIANTS: dict[str, frozenset[TopicMapping]] = {
     "all_software": frozenset(),
@@ -82,12 +81,17 @@ def run_variant(profile: Profile, variant: str, pictures: int) -> Drive:
             files.folder, files.configuration, files.interfaces, lambda app: run_nodes(app, chain)
         )
         simulation.add_board(profile, project, project.mapping(None), BoardOptions())
-        robot = simulation.add_robot(pictures)
+        trips: list[RoundTrip] = []
+        robot = simulation.add_robot(RobotOptions("", pictures), trips.append)
         simulation.run()
     return Drive(
         robot.steps,
-        {number: [ns / 1e6 for ns in sections] for number, sections in _timed(chain.sections_ns())},
-        {number: ns / 1e6 for number, ns in _timed(robot.loop_ns)},
+        {
+            int(number): [ns / 1e6 for ns in sections]
+            for number, sections in chain.sections_ns().items()
+            if number != "0"
+        },
+        {trip.index: trip.time_ns / 1e6 for trip in trips if trip.index and trip.time_ns is not None},
         robot.unexpected,
     )
 
@@ -187,7 +191,3 @@ def _mapped_project(applied: frozenset[TopicMapping]) -> ProjectFiles:
             },
         )
         return read_project(copy)
-
-
-def _timed(by_number: Mapping[str, T]) -> Iterator[tuple[int, T]]:
-    return ((int(number), value) for number, value in by_number.items() if number != "0")

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from board_daemon.hosting import BoardOptions
     from host_clients.camera import CameraOptions
     from host_clients.daemon import ClientOptions
+    from host_clients.robot import RobotOptions
     from reconros_zenoh.board.profile import Profile
     from reconros_zenoh.measure.record import RoundTrip
     from reconros_zenoh.project.loader import Project
@@ -113,9 +114,10 @@ class Simulation:
         self._done.append(camera.done)
         return camera
 
-    def add_robot(self, pictures: int) -> DrivingRobot:
-        """Return the robot of the driving example; it takes so many pictures."""
-        robot = DrivingRobot(self.environment, self.context(), self._types, pictures)
+    def add_robot(self, options: RobotOptions, on_trip: Callable[[RoundTrip], None]) -> DrivingRobot:
+        """Return a robot of the driving example; `router`, `out` and `view` say nothing here."""
+        context = self.context(options.domain)
+        robot = DrivingRobot(self.environment, context, self._types, options, on_trip)
         self._done.append(robot.done)
         return robot
 

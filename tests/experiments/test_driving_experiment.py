@@ -12,6 +12,7 @@ import pytest
 from typer.testing import CliRunner
 
 from board_daemon.hosting import BoardOptions
+from host_clients.robot import RobotOptions
 from reconros_zenoh.applications.driving.nodes import check_picture
 from reconros_zenoh.applications.driving.world import RED_S
 from reconros_zenoh.board.profile import read_profile
@@ -103,7 +104,7 @@ def test_the_map_finds_in_each_picture_what_was_in_the_one_before() -> None:
             "/matches",
             lambda received: matches.append(received.message.data),
         )
-        simulation.add_robot(5)
+        simulation.add_robot(RobotOptions("", 5), lambda _: None)
         simulation.run()
     first, *others = matches
     assert first == 0
@@ -162,8 +163,8 @@ def test_a_picture_of_another_size_is_refused() -> None:
 
 def test_a_robot_that_nobody_drives_gives_up() -> None:
     with Simulation(TypeRegistry()) as simulation:
-        simulation.add_robot(1)
-        with pytest.raises(TransportError, match="nobody subscribed to /image_raw"):
+        simulation.add_robot(RobotOptions("", 1, wait_s=0.5), lambda _: None)
+        with pytest.raises(TransportError, match="nobody in domain 0 subscribed to /image_raw"):
             simulation.run()
 
 

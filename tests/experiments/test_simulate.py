@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 ROOT = Path(__file__).parents[2]
 ROUNDTRIP = ROOT / "deploy" / "roundtrip.yaml"
 DESIGN = ROOT / "deploy" / "design_example.yaml"
+DRIVING = ROOT / "deploy" / "driving.yaml"
 CLIENTS = {"sort", "inverse", "sobel", "mnist", "hash"}
 CELL_KEYS = {"n", "lost", "wrong", "median_ms", "p95_ms", "p99_ms"}
 ECHO = ROOT / "tests" / "benchmarks" / "echo"
@@ -77,6 +78,19 @@ def test_the_design_example_is_simulated_from_the_file_of_up(tmp_path: Path) -> 
     assert 0 < board["viewer"]["n"] <= 10
     assert board["viewer_control"]["n"] > 15
     assert {cell["wrong"] for cell in board.values()} == {0}
+
+
+def test_the_driving_example_is_simulated_from_the_file_of_up(tmp_path: Path) -> None:
+    output = run("-f", DRIVING, "--requests", 5, "--out", tmp_path, "--json")
+    assert records(tmp_path).keys() == {"board0/robot.csv"}
+    cell = json.loads(output)["boards"]["board0"]["robot"]
+    assert (cell["n"], cell["lost"], cell["wrong"]) == (5, 0, 0)
+
+
+def test_a_robot_in_a_domain_without_a_board_is_refused(tmp_path: Path) -> None:
+    file = write_deployment(tmp_path, BOARD, "reconros robot --domain=3")
+    with pytest.raises(FileError, match=r"file\.yaml:5: .* asks in domain 3, where no board is"):
+        run("-f", file, "--out", tmp_path)
 
 
 def test_a_camera_in_a_domain_without_a_board_is_refused(tmp_path: Path) -> None:

@@ -25,7 +25,7 @@ GREY, WHITE = (np.full((48, 64, 3), level, np.uint8) for level in (128, 255))
 
 @pytest.fixture
 def server() -> Iterator[PictureServer]:
-    with PictureServer(0) as server:
+    with PictureServer(0, "what is seen") as server:
         yield server
 
 
@@ -64,7 +64,7 @@ def test_the_stream_has_each_picture_that_is_shown(server: PictureServer) -> Non
 
 
 def test_the_stream_ends_with_the_server_and_a_browser_that_goes_does_no_harm() -> None:
-    with PictureServer(0) as server:
+    with PictureServer(0, "what is seen") as server:
         stays, goes = connect(server), connect(server)
         server.show(GREY)
         streams = []
@@ -98,4 +98,4 @@ def test_a_port_that_is_taken_is_named(server: PictureServer) -> None:
     port = urlsplit(server.url).port
     assert port is not None
     with pytest.raises(UsageError, match=f"port {port} cannot be used for the pictures"):
-        PictureServer(port)
+        PictureServer(port, "what is seen")

@@ -46,9 +46,9 @@ def compensate(picture: Picture) -> Picture:
     grey = cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY)
     shares = np.cumsum(cv2.calcHist([grey], [0], None, [256], [0, 256])) / grey.size
     low, high = np.searchsorted(shares, [_OUTLIERS / 2, 1 - _OUTLIERS / 2])
-    smooth: Any = cv2.medianBlur(picture, 3)
-    outliers = (grey < low) | (grey > high)
-    return np.where(outliers[..., np.newaxis], smooth, picture)
+    usual = cv2.inRange(grey, np.array(low), np.array(high))
+    compensated: Any = cv2.copyTo(picture, usual, cv2.medianBlur(picture, 3))
+    return compensated  # type: ignore[no-any-return] # as OpenCV's stubs have it
 
 
 def blur(picture: Picture) -> Picture:
@@ -72,15 +72,16 @@ def plan_lane(picture: Picture) -> Picture:
 
 def fit_lane(lines: Picture) -> tuple[float, float, float, int]:
     """Return offset, slope, curvature and pixels of `Lane.msg` by least squares, from the bird's view."""
-    rows, columns = np.nonzero(lines)
-    if not len(rows):
+    found: Any = cv2.findNonZero(lines)
+    if found is None:
         return 0.0, 0.0, 0.0, 0
+    columns, rows = found.reshape(-1, 2).T
     x, y, _ = ground_of_birds_view() @ np.stack([columns, rows, np.ones(len(rows))])
-    powers = np.stack([np.ones_like(x), x, x * x], axis=1)
+    powers = np.stack([np.ones_like(x), x, x * x])
     lane = np.zeros(3)
     for _ in range(_FITS):  # which line a pixel belongs to, by the lane so far
-        to_middle = y - np.copysign(LANE_WIDTH / 2, y - powers @ lane)
-        lane = np.linalg.lstsq(powers, to_middle, rcond=None)[0]
+        to_middle = y - np.copysign(LANE_WIDTH / 2, y - lane @ powers)
+        lane = np.linalg.lstsq(powers @ powers.T, powers @ to_middle, rcond=None)[0]
     offset, slope, curvature = lane.tolist()
     return offset, slope, curvature, len(rows)
 

@@ -1,0 +1,85 @@
+"""The robot of the driving example: what it does with commands, those that no board sends included."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from host_clients.robot import DrivingRobot, RobotOptions
+from reconros_zenoh.applications.driving.world import RADIUS
+from reconros_zenoh.clock.virtual import VirtualEnvironment
+from reconros_zenoh.measure.record import RoundTrip
+from reconros_zenoh.rmw.node import Context
+from reconros_zenoh.ros.types import TypeRegistry
+from reconros_zenoh.transport.simulated import SimulatedNetwork
+
+MS = 1_000_000
+
+
+class Drive:
+    """A robot that takes three pictures, and a driver that answers what `command` returns for each."""
+
+    def __init__(self, command: Any) -> None:
+        self.environment, types = VirtualEnvironment(), TypeRegistry()
+        network = SimulatedNetwork(self.environment)
+        self.here, there = (
+            Context(network.transport(name), 0, self.environment.clock_ns) for name in ("a1", "b2")
+        )
+        self.trips: list[RoundTrip] = []
+        self.robot = DrivingRobot(self.environment, self.here, types, RobotOptions("", 3), self.trips.append)
+        twist, vector, header = (
+            types.message(name).cls
+            for name in ("geometry_msgs/msg/Twist", "geometry_msgs/msg/Vector3", "std_msgs/msg/Header")
+        )
+        driver = there.node("driver")
+        publisher = driver.publisher(types.message("geometry_msgs/msg/TwistStamped"), "/drive")
+
+        def answer(received: Any) -> None:
+            picture = received.message.header
+            found = command(int(picture.frame_id))
+            if found is not None:
+                number, speed, turn = found
+                motion = twist(linear=vector(x=speed, y=0.0, z=0.0), angular=vector(x=0.0, y=0.0, z=turn))
+                stamped = publisher.message_type.cls(
+                    header=header(stamp=picture.stamp, frame_id=number), twist=motion
+                )
+                self.environment.call_later(5 * MS, publisher.publish, stamped)
+
+        driver.subscription(types.message("sensor_msgs/msg/Image"), "/image_raw", answer)
+        self.environment.run(until=self.robot.done)
+
+
+def test_it_drives_as_it_is_told_and_notes_how_long_it_took() -> None:
+    drive = Drive(lambda number: (str(number), 0.5, 0.0))
+    assert drive.trips == [RoundTrip(number, 5 * MS, "ok") for number in range(3)]
+    assert [step.speed for step in drive.robot.steps] == [0.0, 0.5, 0.5]
+    # Straight on, along the tangent, from 5 ms on.
+    assert [step.y for step in drive.robot.steps] == pytest.approx([0, 0.0475, 0.0975])
+    assert [step.x for step in drive.robot.steps] == pytest.approx([RADIUS] * 3)
+    assert (drive.robot.unanswered, drive.robot.unexpected) == (0, 0)
+
+
+def test_a_picture_without_a_command_is_lost() -> None:
+    drive = Drive(lambda number: None if number == 1 else (str(number), 0.0, 0.0))
+    assert [(trip.index, trip.outcome) for trip in drive.trips] == [(0, "ok"), (2, "ok"), (1, "lost")]
+
+
+@pytest.mark.parametrize("number", ["7", "", "none", "0"])
+def test_a_command_for_no_picture_is_not_obeyed(number: str) -> None:
+    """Nor is a second one for the same picture."""
+    drive = Drive(lambda _: (number, 1.0, 0.0))
+    first = 1 if number == "0" else 0
+    assert drive.robot.unexpected == 3 - first
+    assert [trip.outcome for trip in drive.trips].count("ok") == first
+
+
+@pytest.mark.parametrize(
+    ("speed", "turn", "reason"),
+    [(float("nan"), 0.0, "speed"), (1e300, 0.0, "speed"), (0.0, float("-inf"), "turn")],
+)
+def test_what_no_robot_can_do_is_refused(speed: float, turn: float, reason: str) -> None:
+    drive = Drive(lambda number: (str(number), speed, turn))
+    assert drive.here.rejections.counts() == {reason: 3}
+    assert [trip.outcome for trip in drive.trips] == ["lost"] * 3
+    assert {(step.x, step.y) for step in drive.robot.steps} == {(RADIUS, 0)}
