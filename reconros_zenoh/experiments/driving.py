@@ -8,7 +8,7 @@ import statistics
 import tempfile
 from dataclasses import dataclass
 from importlib.resources import as_file, files
-from itertools import pairwise
+from itertools import dropwhile, pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +17,7 @@ from host_clients.robot import RATE_HZ, RobotOptions, Step
 from reconros_zenoh.applications.driving.chain import STATIONS, Chain
 from reconros_zenoh.applications.driving.kernels import LANE_WIDTH
 from reconros_zenoh.applications.driving.main import run_nodes
-from reconros_zenoh.errors import UsageError
+from reconros_zenoh.errors import ExperimentError, UsageError
 from reconros_zenoh.experiments.provenance import machine, provenance, writing
 from reconros_zenoh.experiments.simulation import Simulation
 from reconros_zenoh.mapping.apply import apply_mapping
@@ -73,27 +73,26 @@ def check_profile(profile: Profile) -> None:
 
 
 def run_variant(profile: Profile, variant: str, pictures: int) -> Drive:
-    """Return the drive with so many pictures."""
-    files = _mapped_project(VARIANTS[variant])
-    with Simulation(files.types()) as simulation:
+    """Return the drive with so many pictures; raise ExperimentError when none came through the chain."""
+    mapped = _mapped_project(VARIANTS[variant])
+    with Simulation(mapped.types()) as simulation:
         chain = Chain(simulation.environment.clock_ns)
         project = Project(
-            files.folder, files.configuration, files.interfaces, lambda app: run_nodes(app, chain)
+            mapped.folder, mapped.configuration, mapped.interfaces, lambda app: run_nodes(app, chain)
         )
         simulation.add_board(profile, project, project.mapping(None), BoardOptions())
         trips: list[RoundTrip] = []
         robot = simulation.add_robot(RobotOptions("", pictures), trips.append)
         simulation.run()
-    return Drive(
-        robot.steps,
-        {
-            int(number): [ns / 1e6 for ns in sections]
-            for number, sections in chain.sections_ns().items()
-            if number != "0"
-        },
-        {trip.index: trip.time_ns / 1e6 for trip in trips if trip.index and trip.time_ns is not None},
-        robot.unexpected,
-    )
+    sections_ms = {
+        int(number): [ns / 1e6 for ns in sections]
+        for number, sections in chain.sections_ns().items()
+        if number != "0"
+    }
+    loop_ms = {trip.index: trip.time_ns / 1e6 for trip in trips if trip.index and trip.time_ns is not None}
+    if not loop_ms:
+        raise ExperimentError(f"{variant}: no picture came through the chain in time.")
+    return Drive(robot.steps, sections_ms, loop_ms, robot.unexpected)
 
 
 def summary(
@@ -157,6 +156,7 @@ def write_records(folder: Path, drives: Mapping[str, Drive]) -> None:
 
 def _variant(name: str, drive: Drive) -> dict[str, Any]:
     sections = zip(*drive.sections_ms.values(), strict=True)
+    under_way = dropwhile(lambda step: not step.speed, drive.steps)
     paper_mean_ms, paper_sd_ms = _PAPER_MS.get(name, (None, None))
     return {
         "answered": len(drive.chain_ms),
@@ -168,7 +168,7 @@ def _variant(name: str, drive: Drive) -> dict[str, Any]:
         "sections_ms": dict(zip(SECTIONS, map(statistics.fmean, sections), strict=True)),
         "loop_median_ms": statistics.median(drive.loop_ms.values()),
         "most_off_lane_mm": max(abs(step.off_lane) for step in drive.steps) * 1e3,
-        "stood_s": sum(step.speed == 0 for step in drive.steps) / RATE_HZ,
+        "stood_s": sum(not step.speed for step in under_way) / RATE_HZ,
     }
 
 

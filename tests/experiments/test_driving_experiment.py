@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+from dataclasses import replace
 from functools import cache
 from importlib.resources import as_file, files
 from typing import TYPE_CHECKING, Any
@@ -17,7 +18,7 @@ from reconros_zenoh.applications.driving.nodes import check_picture
 from reconros_zenoh.applications.driving.world import RED_S
 from reconros_zenoh.board.profile import read_profile
 from reconros_zenoh.cli.experiment import app
-from reconros_zenoh.errors import BadMessageError, TransportError, UsageError
+from reconros_zenoh.errors import BadMessageError, ExperimentError, TransportError, UsageError
 from reconros_zenoh.experiments import driving
 from reconros_zenoh.experiments.driving import (
     SECTIONS,
@@ -204,3 +205,19 @@ def test_an_interrupted_drive_keeps_the_variants_that_are_complete(
     assert kept["interrupted"]
     assert list(kept["variants"]) == ["all_software", "hardware_topics"]
     assert (tmp_path / "driving.png").exists()
+
+
+def test_a_robot_that_never_stops_has_not_stood() -> None:
+    """That it stands until its first command is not heeding the light."""
+    measured = drive("gateways")
+    never = replace(measured, steps=[step for step in measured.steps if step.speed or step.seconds < 0.5])
+    (variant,) = summary(PROFILE, PICTURES, {"gateways": never}, interrupted=False)["variants"].values()
+    assert variant["stood_s"] == 0
+
+
+def test_a_board_to_which_no_picture_comes_is_an_error(tmp_path: Path) -> None:
+    text = (files("reconros_zenoh.board.profiles") / "zcu104.toml").read_text(encoding="utf-8")
+    profile = tmp_path / "lossy.toml"
+    profile.write_text(text.replace("loss_probability = { value = 0,", "loss_probability = { value = 1,"))
+    with pytest.raises(ExperimentError, match="all_software: no picture came through"):
+        run_variant(read_profile(str(profile)), "all_software", 20)

@@ -37,7 +37,7 @@ _FITS = 3
 _LOOK_AHEAD = 0.8
 _SPEED = 0.5
 
-# Compensation wants neighbours, the planner the way from its pixels back to the camera's.
+# From pixels of the bird's view to those of the camera's picture.
 _TO_PICTURE = picture_of_ground() @ ground_of_birds_view()
 
 
