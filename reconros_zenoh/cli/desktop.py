@@ -94,9 +94,10 @@ def robot(
     ] = None,
     view: View = None,
 ) -> None:
-    """Be the robot of the driving example: pictures on /image_raw, ten a second, and do what comes on /drive.
+    """Be the robot of the driving example.
 
-    It ends 2 s after the last picture. robot.csv has the times from picture to command.
+    It publishes ten pictures a second on /image_raw and does what comes on /drive, and ends 2 s after the last
+    picture. robot.csv has the times from picture to command.
     """
     from host_clients.desktop import run_robot
     from host_clients.robot import RobotOptions

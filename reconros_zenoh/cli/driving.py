@@ -38,9 +38,9 @@ def driving(
     out: Out = Path("results/driving"),
     as_json: AsJson = False,
 ) -> None:
-    """Section 6 of the gateways paper: a robot that follows a lane.
+    """Section 6 of the gateways paper: driving along a lane.
 
-    Its nodes compensate, blur and plan in slots; ORB key points are found in software. In virtual time, with
+    A robot's nodes compensate, blur and plan in slots; ORB key points are found in software. In virtual time, with
     every topic in memory, then with streams between the nodes in hardware, then with a gateway, too. Exit
     status 0 only if every picture was answered and the robot kept its lane and stood at the red light.
     """
