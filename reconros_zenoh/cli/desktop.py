@@ -96,8 +96,8 @@ def robot(
 ) -> None:
     """Be the robot of the driving example.
 
-    It publishes ten pictures a second on /image_raw and does what comes on /drive, and ends 2 s after the last
-    picture. robot.csv has the times from picture to command.
+    It publishes ten pictures a second on /image_raw and does what comes on /drive, and ends 2 s after the
+    last picture. robot.csv has the times from picture to command.
     """
     from host_clients.desktop import run_robot
     from host_clients.robot import RobotOptions

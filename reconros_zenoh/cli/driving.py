@@ -40,9 +40,9 @@ def driving(
 ) -> None:
     """Section 6 of the gateways paper: driving along a lane.
 
-    A robot's nodes compensate, blur and plan in slots; ORB key points are found in software. In virtual time, with
-    every topic in memory, then with streams between the nodes in hardware, then with a gateway, too. Exit
-    status 0 only if every picture was answered and the robot kept its lane and stood at the red light.
+    A robot's nodes compensate, blur and plan in slots; ORB key points are found in software. In virtual time,
+    with every topic in memory, then with streams between the nodes in hardware, then with a gateway, too.
+    Exit status 0 only if every picture was answered and the robot kept its lane and stood at the red light.
     """
     from reconros_zenoh.board.profile import read_profile
     from reconros_zenoh.experiments.driving import (
