@@ -10,7 +10,7 @@ import typer
 from rich.text import Text
 
 from reconros_zenoh.board.profile import profile_path, read_profile
-from reconros_zenoh.cli.console import titled_table, wide_console
+from reconros_zenoh.cli.console import interrupted, titled_table, wide_console
 from reconros_zenoh.cli.options import AsJson, Seed
 from reconros_zenoh.cli.progress import run_bar
 from reconros_zenoh.errors import UsageError
@@ -21,6 +21,7 @@ from reconros_zenoh.experiments.calibration import (
     planned_evaluations,
 )
 from reconros_zenoh.experiments.calibration import calibrate as fit
+from reconros_zenoh.experiments.interruption import until_interrupted
 from reconros_zenoh.experiments.measured import read_measurements
 from reconros_zenoh.experiments.profile_file import replacing, with_values
 from reconros_zenoh.experiments.roundtrip import application
@@ -72,7 +73,7 @@ def calibrate(
 ) -> None:
     """Fit a profile's calibrated constants to measured round trips.
 
-    All other constants are held.
+    All other constants are held. Ctrl-C ends the search and keeps the best that it has found.
     """
     start = read_profile(profile)
     source = TomlFile.read(profile_path(profile))
@@ -81,8 +82,13 @@ def calibrate(
     measured = read_measurements([*data, *(more_data or [])], project, _assignments(mapping or []), trim=trim)
     with replacing(out) as file:
         total = planned_evaluations(constants, evaluations)
-        with run_bar(f"fitting {len(constants)} constants", total, quiet=as_json) as advance:
+        with (
+            run_bar(f"fitting {len(constants)} constants", total, quiet=as_json) as advance,
+            until_interrupted() as interruption,
+        ):
             found = fit(start, measured, evaluations, requests, seed, advance)
+        if interruption.happened:
+            raise interrupted(quiet=as_json, measured=False)
         values = {
             each.constant.place: each.value for each in found.constants if each.value != each.constant.value
         }
@@ -92,6 +98,8 @@ def calibrate(
     else:
         _print(wide_console(), found)
         print(f"the fitted profile is {out}")
+    if found.interrupted:
+        raise interrupted(quiet=as_json)
 
 
 def _assignments(given: list[str]) -> dict[str, str]:
@@ -110,6 +118,7 @@ def _object(found: Calibration, out: Path, requests: int, seed: int) -> dict[str
         "requests": requests,
         "seed": seed,
         "evaluations": found.evaluations,
+        "interrupted": found.interrupted,
         "objective": {"before": found.before, "after": found.after, "noise": found.noise},
         "cells": [
             {
@@ -163,8 +172,8 @@ def _print(console: Console, found: Calibration) -> None:
             each.constant.unit,
             f"{each.constant.value:.4g}",
             f"{each.value:.4g}",
-            f"{each.sensitivity:.3f}",
-            "" if each.determined else Text("not determined", style="yellow"),
+            "-" if each.sensitivity is None else f"{each.sensitivity:.3f}",
+            Text("not determined", style="yellow") if each.determined is False else "",
         )
     console.print(constants)
     console.print(
@@ -172,7 +181,7 @@ def _print(console: Console, found: Calibration) -> None:
         f"{found.noise:.3f} (standard deviation). {found.evaluations} evaluations.",
         highlight=False,
     )
-    if vague := [each.constant.name for each in found.constants if not each.determined]:
+    if vague := [each.constant.name for each in found.constants if each.determined is False]:
         console.print(
             Text(
                 f"warning: the data do not determine {', '.join(vague)}: 20 % more or less changes the "

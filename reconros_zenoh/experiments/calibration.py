@@ -17,6 +17,7 @@ from pydantic import BaseModel
 
 from reconros_zenoh.board.quantity import Count, Fraction, Quantity, Share
 from reconros_zenoh.errors import UsageError
+from reconros_zenoh.experiments.interruption import until_interrupted
 from reconros_zenoh.experiments.measured import quartiles_ms
 from reconros_zenoh.experiments.parallel import ParallelRuns, Run, pooled
 from reconros_zenoh.experiments.profile_file import varied
@@ -66,13 +67,14 @@ class FittedConstant:
     """A constant and what became of it.
 
     `sensitivity` is the most that the objective changes when the constant is 20 % more or less. Data that
-    change it no more than the seeds do leave the constant undetermined.
+    change it no more than the seeds do leave the constant undetermined. Both are None when the calibration
+    was interrupted before.
     """
 
     constant: Constant
     value: float
-    sensitivity: float
-    determined: bool
+    sensitivity: float | None
+    determined: bool | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,6 +99,7 @@ class Calibration:
     after: float
     noise: float
     evaluations: int
+    interrupted: bool
 
 
 class _Evaluation(NamedTuple):
@@ -140,6 +143,8 @@ def calibrate(
     step down, doubles the step where that helped and halves it where it did not, and ends after that many
     `evaluations` or when all steps are below 2 %. `on_evaluation` is called after each evaluation (three
     runs of different seeds under each measured mapping).
+
+    Ctrl-C ends the search with the best values so far; before it has begun it raises KeyboardInterrupt.
     """
     constants = calibrated_constants(profile)
     with ParallelRuns() as parallel:
@@ -162,24 +167,27 @@ def calibrate(
         start = [constant.value for constant in constants]
         before = evaluate([(start, each) for each in range(SAMPLES)])
         noise = float(np.std([each.objective for each in before], ddof=1))
-        values, best, used = _search(constants, before[0].objective, noise, evaluations, evaluate)
-        after = evaluate([(values, each) for each in range(SAMPLES)])
-        around = evaluate(
-            [
-                (_moved(constants, values, index, factor), 0)
-                for index in range(len(constants))
-                for factor in (1 + _SENSITIVITY_STEP, 1 - _SENSITIVITY_STEP)
-            ]
-        )
-    sensitivities = [
-        max(abs(each.objective - best) for each in around[2 * index : 2 * index + 2])
-        for index in range(len(constants))
-    ]
+        search = _Search(constants, noise, start, before[0])
+        after: list[_Evaluation] = []
+        around: list[_Evaluation] = []
+        with until_interrupted() as interruption:
+            search.run(evaluations, evaluate)
+            after = evaluate([(search.values, each) for each in range(SAMPLES)])
+            around = evaluate(
+                [
+                    (_moved(constants, search.values, index, factor), 0)
+                    for index in range(len(constants))
+                    for factor in (1 + _SENSITIVITY_STEP, 1 - _SENSITIVITY_STEP)
+                ]
+            )
+    after = after or [search.best]
+    changes = [abs(each.objective - search.best.objective) for each in around]
+    sensitivities = [max(changes[2 * index : 2 * index + 2], default=None) for index in range(len(constants))]
     return Calibration(
-        profile=_profile(profile, constants, values),
+        profile=_profile(profile, constants, search.values),
         constants=tuple(
-            FittedConstant(constant, value, sensitivity, sensitivity > noise)
-            for constant, value, sensitivity in zip(constants, values, sensitivities, strict=True)
+            FittedConstant(constant, value, sensitivity, None if sensitivity is None else sensitivity > noise)
+            for constant, value, sensitivity in zip(constants, search.values, sensitivities, strict=True)
         ),
         cells=tuple(
             FittedCell(
@@ -195,35 +203,43 @@ def calibrate(
         before=float(np.mean([each.objective for each in before])),
         after=float(np.mean([each.objective for each in after])),
         noise=noise,
-        evaluations=used + len(before) + len(after) + len(around),
+        evaluations=search.used + len(before) + len(after) + len(around),
+        interrupted=interruption.happened,
     )
 
 
-def _search(
-    constants: Sequence[Constant],
-    best: float,
-    noise: float,
-    evaluations: int,
-    evaluate: Callable[[Sequence[tuple[Sequence[float], int]]], list[_Evaluation]],
-) -> tuple[list[float], float, int]:
-    """Return the best values found, their objective, and how many evaluations that took."""
-    values = [constant.value for constant in constants]
-    steps = [_FIRST_STEP] * len(constants)
-    used = 0
-    while used + 2 <= evaluations and max(steps) >= _LAST_STEP:
-        for index, step in enumerate(steps):
-            if step < _LAST_STEP or used + 2 > evaluations:
-                continue
-            tried = [_moved(constants, values, index, factor) for factor in (math.exp(step), math.exp(-step))]
-            objectives = [each.objective for each in evaluate([(point, 0) for point in tried])]
-            used += len(tried)
-            least = min(objectives)
-            if least < best - noise:
-                values, best = tried[objectives.index(least)], least
-                steps[index] *= 2
-            else:
-                steps[index] /= 2
-    return values, best, used
+@dataclass(slots=True)
+class _Search:
+    """The best values so far, what came of them, and how many evaluations it took to find them."""
+
+    constants: Sequence[Constant]
+    noise: float
+    values: list[float]
+    best: _Evaluation
+    used: int = 0
+
+    def run(
+        self,
+        evaluations: int,
+        evaluate: Callable[[Sequence[tuple[Sequence[float], int]]], list[_Evaluation]],
+    ) -> None:
+        """Search until so many evaluations are used or all steps are small."""
+        steps = [_FIRST_STEP] * len(self.constants)
+        while self.used + 2 <= evaluations and max(steps) >= _LAST_STEP:
+            for index, step in enumerate(steps):
+                if step < _LAST_STEP or self.used + 2 > evaluations:
+                    continue
+                tried = [
+                    _moved(self.constants, self.values, index, math.exp(signed)) for signed in (step, -step)
+                ]
+                found = evaluate([(point, 0) for point in tried])
+                self.used += len(tried)
+                least, values = min(zip(found, tried, strict=True), key=lambda each: each[0].objective)
+                if least.objective < self.best.objective - self.noise:
+                    self.values, self.best = values, least
+                    steps[index] *= 2
+                else:
+                    steps[index] /= 2
 
 
 def _constants(part: object, place: tuple[str, ...]) -> Iterator[Constant]:

@@ -3,26 +3,39 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 import tomllib
 from importlib import resources
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Self
 
+import numpy as np
 import pytest
+import typer
 
 from reconros_zenoh.board.profile import read_profile
 from reconros_zenoh.cli.calibrate import calibrate as command
 from reconros_zenoh.errors import FileError, UsageError
-from reconros_zenoh.experiments.calibration import Constant, _Evaluation, _search, calibrated_constants
+from reconros_zenoh.experiments import calibration
+from reconros_zenoh.experiments.calibration import (
+    _FIRST_STEP,
+    _SEEDS,
+    SAMPLES,
+    Constant,
+    _Evaluation,
+    _Search,
+    calibrated_constants,
+)
 from reconros_zenoh.experiments.measured import read_measurements
 from reconros_zenoh.experiments.parallel import Run, records_of
 from reconros_zenoh.experiments.profile_file import replacing, varied, with_values
-from reconros_zenoh.experiments.roundtrip import application_folder
+from reconros_zenoh.experiments.roundtrip import CLIENTS, application_folder
+from reconros_zenoh.measure.record import Record
 from reconros_zenoh.project.loader import load_project
 from reconros_zenoh.toml_file import TomlFile
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Iterator, Sequence
     from pathlib import Path
 
 MINIITX = (resources.files("reconros_zenoh.board") / "profiles" / "miniitx-zynq7100.toml").read_text("utf-8")
@@ -292,7 +305,69 @@ def test_the_search_makes_no_more_evaluations_than_allowed(allowed: int, made: i
         points.extend(tuple(values) for values, _ in asked)
         return [_Evaluation({}, abs(values[0] - 50) + abs(values[1] - 50)) for values, _ in asked]
 
-    values, objective, used = _search(constants, 98.0, 0.0, allowed, evaluate)
-    assert (len(points), used) == (made, made)
-    assert objective == abs(values[0] - 50) + abs(values[1] - 50)
-    assert (objective < 98) == (made > 0)
+    search = _Search(constants, 0.0, [1.0, 1.0], _Evaluation({}, 98.0))
+    search.run(allowed, evaluate)
+    assert (len(points), search.used) == (made, made)
+    assert search.best.objective == abs(search.values[0] - 50) + abs(search.values[1] - 50)
+    assert (search.best.objective < 98) == (made > 0)
+
+
+class _Runs:
+    """Runs whose sort takes as many ms as per_message says, interrupted after so many."""
+
+    left = 0
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        pass
+
+    def records(self, runs: Iterable[Run]) -> Iterator[dict[str, Record]]:
+        for run in runs:
+            if not _Runs.left:
+                raise KeyboardInterrupt
+            _Runs.left -= 1
+            assert run.profile.model is not None
+            value = run.profile.model.dds.per_message.value
+            yield {client: Record(client, np.full(3, value)) for client in ("sort", *CLIENTS)}
+
+
+@pytest.mark.parametrize("as_json", [False, True])
+def test_an_interrupted_search_keeps_the_best_that_it_has_found(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], as_json: bool
+) -> None:
+    profile = fitting_only(tmp_path / "p.toml", PER_MESSAGE)
+    start = read_profile(str(profile)).model.dds.per_message.value  # type: ignore[union-attr]
+    data = measure(tmp_path / "data", "mixed", "Sort;\n" + f"{3 * start};\n" * 30)
+    monkeypatch.setattr(calibration, "ParallelRuns", _Runs)
+    _Runs.left = (SAMPLES + 2) * _SEEDS + 1  # in the search's second step
+    out = tmp_path / "p2.toml"
+    with pytest.raises(typer.Exit) as ended:
+        command(str(profile), [data], out, as_json=as_json)
+    assert ended.value.exit_code == 130
+    printed = capsys.readouterr().out
+    better = pytest.approx(start * math.exp(_FIRST_STEP), rel=0.001)
+    assert tomllib.loads(out.read_text())["model"]["dds"]["per_message"]["value"] == better
+    if as_json:
+        found = json.loads(printed)
+        assert found["interrupted"]
+        (constant,) = found["constants"]
+        assert (constant["new"], constant["sensitivity"], constant["determined"]) == (better, None, None)
+        (cell,) = found["cells"]
+        assert cell["after"]["median_ms"] == better
+    else:
+        assert printed.endswith("interrupted before its end\n")
+        assert "do not determine" not in printed
+
+
+def test_what_is_interrupted_before_the_search_writes_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(calibration, "ParallelRuns", _Runs)
+    _Runs.left = 2
+    with pytest.raises(typer.Exit) as ended:
+        command("miniitx-zynq7100", [measure(tmp_path / "data", "mixed")], tmp_path / "p2.toml")
+    assert ended.value.exit_code == 130
+    assert capsys.readouterr().out == "interrupted before anything was measured\n"
+    assert [path.name for path in tmp_path.iterdir()] == ["data"]
