@@ -66,13 +66,13 @@ def simulate(
         ):
             run.run(advance)
         run.write_records(out)
-    summaries = run.summaries()
+    summaries, totals = run.summaries(), run.totals()
     simulated_s = run.simulated_ns / 1e9
     if as_json:
-        facts = {"file": str(file), "simulated_s": simulated_s, "boards": summaries}
+        facts = {"file": str(file), "simulated_s": simulated_s, "boards": summaries, "all_boards": totals}
         print(json.dumps(facts | {"interrupted": interruption.happened}))
     else:
-        _print_table(wide_console(), summaries)
+        _print_table(wide_console(), summaries | ({"all boards": totals} if len(summaries) > 1 else {}))
         print(f"{simulated_s:.1f} s of virtual time; the records are in {out}")
     if interruption.happened:
         raise interrupted(quiet=as_json)

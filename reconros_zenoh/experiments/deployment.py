@@ -177,6 +177,14 @@ class DeploymentRun:
             for board, services in self.round_trips.items()
         }
 
+    def totals(self) -> dict[str, dict[str, Any]]:
+        """Return the same of each client's round trips with all boards together, by service."""
+        trips: dict[str, list[RoundTrip]] = {}
+        for services in self.round_trips.values():
+            for service, made in services.items():
+                trips.setdefault(service, []).extend(made)
+        return {service: _summary(service, made) for service, made in trips.items()}
+
 
 def _summary(service: str, trips: Sequence[RoundTrip]) -> dict[str, Any]:
     record = Record.of(service, trips)

@@ -129,7 +129,10 @@ def test_what_was_measured_before_an_interruption_is_kept(
 
 def test_the_json_names_boards_and_services(tmp_path: Path) -> None:
     answer = json.loads(run("-f", ROUNDTRIP, "--boards", 2, "--requests", 2, "--out", tmp_path, "--json"))
-    assert answer.keys() == {"file", "simulated_s", "boards", "interrupted"}
+    assert answer.keys() == {"file", "simulated_s", "boards", "all_boards", "interrupted"}
+    assert {client: cell["n"] for client, cell in answer["all_boards"].items()} == dict.fromkeys(CLIENTS, 4)
+    slowest = [services["sobel"]["max_ms"] for services in answer["boards"].values()]
+    assert answer["all_boards"]["sobel"]["max_ms"] == max(slowest)
     assert answer["interrupted"] is False
     assert answer["simulated_s"] > 0
     assert answer["boards"].keys() == {"board0-0", "board0-1"}
