@@ -5,7 +5,7 @@ matplotlib is imported where it draws, because it takes a second and most comman
 
 from __future__ import annotations
 
-from itertools import accumulate, pairwise
+from itertools import accumulate, groupby, pairwise
 from typing import TYPE_CHECKING, Any
 
 from reconros_zenoh.errors import UsageError
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from reconros_zenoh.mapping.graph import ComputationGraph
-    from reconros_zenoh.mapping.layout import Layout
+    from reconros_zenoh.mapping.layout import Layout, Place
 
 _INK = "#24292f"
 _EDGE = "#7a8794"
@@ -37,7 +37,7 @@ _LEGEND_TEXTS = {
     TopicMapping.HARDWARE: "in hardware (HMT)",
     TopicMapping.GATEWAY: "with a gateway",
 }
-_BOX, _LETTER, _GAP, _ROW, _STRIP, _LEGEND = 0.42, 0.085, 0.45, 0.62, 0.35, 6.3
+_BOX, _LETTER, _GAP, _ROW, _STRIP, _LEGEND = 0.42, 0.085, 0.75, 0.62, 0.35, 6.3
 """Heights of box, row and strips above and below, widths of a letter, a gap and the legend [inch]."""
 _MOST_PIXELS = 30_000  # matplotlib draws no more than 2**16 in a row
 _STYLE: Any = {
@@ -117,10 +117,11 @@ def draw(graph: ComputationGraph, mappings: Mapping[str, TopicMapping]) -> Figur
 
     layout = lay_out(graph, mappings)
     widths = {vertex: _width(vertex, mappings) for vertex in layout.vertices}
-    centres = _centres(layout, widths)
+    columns = _columns(layout, widths)
+    centres = [(left + right) / 2 for left, right in columns]
     rows = [place.row for way in (*layout.ways.values(), layout.vertices.values()) for place in way]
     top, bottom = ((row + 1) * _ROW for row in (max(rows, default=0), min(rows, default=-1) - 1))
-    right = max(centres[-1] + centres[0], _LEGEND)
+    right = max(columns[-1][1] + _GAP, _LEGEND)
     figure = Figure(figsize=(right, top - bottom + 3 * _STRIP))
     axes = figure.add_axes((0, 0, 1, 1), xlim=(0, right), ylim=(bottom - 2 * _STRIP, top + _STRIP))
     axes.set_axis_off()
@@ -129,8 +130,8 @@ def draw(graph: ComputationGraph, mappings: Mapping[str, TopicMapping]) -> Figur
     axes.text(0.1, bottom, "software", va="top", fontstyle="italic")
     crossing = set(crossing_edges(graph, mappings))
     for edge, way in layout.ways.items():
-        ends = [widths[vertex] / 2 for vertex in ends_of(edge)]
-        _draw_edge(axes, [(centres[column], _height(row)) for column, row in way], ends, edge in crossing)
+        points = _way(way, columns, [widths[vertex] / 2 for vertex in ends_of(edge)])
+        _draw_edge(axes, points, edge in crossing)
     for vertex, (column, row) in layout.vertices.items():
         _draw_vertex(axes, vertex, mappings, (centres[column], _height(row)), widths[vertex])
     _draw_legend(axes, bottom - 1.5 * _STRIP, len(crossing))
@@ -142,13 +143,29 @@ def _width(vertex: Vertex, mappings: Mapping[str, TopicMapping]) -> float:
     return max(_BOX, max(map(len, lines)) * _LETTER + 0.2)
 
 
-def _centres(layout: Layout, widths: Mapping[Vertex, float]) -> list[float]:
-    """Return the middle of each column, whose width is that of its widest vertex."""
+def _columns(layout: Layout, widths: Mapping[Vertex, float]) -> list[tuple[float, float]]:
+    """Return where each column begins and ends: it is as wide as its widest vertex."""
     columns = [0.0] * (1 + max((place.column for place in layout.vertices.values()), default=0))
     for vertex, place in layout.vertices.items():
         columns[place.column] = max(columns[place.column], widths[vertex])
     starts = accumulate((width + _GAP for width in columns), initial=_GAP)
-    return [start + width / 2 for start, width in zip(starts, columns, strict=False)]
+    return [(start, start + width) for start, width in zip(starts, columns, strict=False)]
+
+
+def _way(
+    places: list[Place], columns: list[tuple[float, float]], half_widths: list[float]
+) -> list[tuple[float, float]]:
+    """Return the points of an edge: in each column it is level, so that it passes behind nothing."""
+    forward = places[0].column < places[-1].column
+    points = []
+    for column, row in places:
+        near, far = columns[column] if forward else columns[column][::-1]
+        points += [(near, _height(row)), (far, _height(row))]
+    for end, half_width in ((0, half_widths[0]), (-1, -half_widths[1])):
+        centre = sum(columns[places[end].column]) / 2
+        points[end] = (centre + (half_width if forward else -half_width), points[end][1])
+    # The widest vertex ends with its column; between points that are one an arrow has no direction.
+    return [point for point, _ in groupby((round(x, 6), y) for x, y in points)]
 
 
 def _height(row: int) -> float:
@@ -175,20 +192,11 @@ def _draw_vertex(
     axes.text(*centre, _NAMES[mapping], ha="center", va="top", zorder=4, fontsize=7)
 
 
-def _draw_edge(
-    axes: Axes, points: list[tuple[float, float]], half_widths: list[float], crosses: bool
-) -> None:
-    """Draw an arrow from border to border through the points, level at each of them."""
+def _draw_edge(axes: Axes, points: list[tuple[float, float]], crosses: bool) -> None:
+    """Draw an arrow through the points, level at each of them."""
     from matplotlib.patches import FancyArrowPatch  # noqa: PLC0415  see the module docstring
     from matplotlib.path import Path as Way  # noqa: PLC0415
 
-    forward = 1 if points[0][0] < points[-1][0] else -1
-    (x, y), *_, (end_x, end_y) = points
-    points = [
-        (x + forward * half_widths[0], y),
-        *points[1:-1],
-        (end_x - forward * half_widths[1], end_y),
-    ]
     vertices, codes = [points[0]], [Way.MOVETO]
     for (x, y), (next_x, next_y) in pairwise(points):
         middle = (x + next_x) / 2

@@ -12,8 +12,8 @@ if TYPE_CHECKING:
     from reconros_zenoh.project.mapping_file import Mapping
     from reconros_zenoh.project.resource_groups import Resource
 
-OUTSIDE = "(outside)"
-"""The node, in software, that stands for the ends a topic has elsewhere than in the project."""
+OUTSIDE = {"rospub": "(from outside)", "rossub": "(to outside)"}
+"""The nodes, in software, that stand for publishers and subscribers elsewhere than in the project."""
 
 
 class TopicEnd(NamedTuple):
@@ -60,8 +60,8 @@ def read_project_graph(configuration: BuildConfiguration, mapping: Mapping | Non
     """Return the graph of all nodes that have topics; see `topic_ends` for what is in hardware.
 
     A ROS node with callbacks on both sides becomes a node on each. A topic of which the project has only
-    publishers, or only subscribers, has its other ends elsewhere, where nothing is in hardware: the node
-    OUTSIDE stands for them. It also subscribes to a topic that has a gateway and no end in software.
+    publishers, or only subscribers, has its other ends elsewhere, where nothing is in hardware: a node of
+    OUTSIDE stands for them. One also subscribes to a topic that has a gateway and no end in software.
     """
     ends = topic_ends(configuration, mapping)
     sides_of: dict[str, set[Side]] = {}
@@ -76,16 +76,17 @@ def read_project_graph(configuration: BuildConfiguration, mapping: Mapping | Non
             nodes[name] = side
             topic[end.resource.type][name] = None
     for topic in found.values():
-        for kind in topic:
+        for kind, outside in OUTSIDE.items():
             if not topic[kind]:
-                topic[kind][OUTSIDE] = None
-                nodes[OUTSIDE] = Side.SOFTWARE
+                topic[kind][outside] = None
+                nodes[outside] = Side.SOFTWARE
     for name in gateway_topics(configuration).values():
         if name in found and all(nodes[node] is Side.HARDWARE for of in found[name].values() for node in of):
-            found[name]["rossub"][OUTSIDE] = None
-            nodes[OUTSIDE] = Side.SOFTWARE
+            found[name]["rossub"][OUTSIDE["rossub"]] = None
+            nodes[OUTSIDE["rossub"]] = Side.SOFTWARE
     topics = tuple(Topic(name, tuple(of["rospub"]), tuple(of["rossub"])) for name, of in found.items())
-    return ComputationGraph(nodes, topics, _notes(configuration, inner=OUTSIDE not in nodes))
+    elsewhere = [name for name in OUTSIDE.values() if name in nodes]
+    return ComputationGraph(nodes, topics, _notes(configuration, elsewhere))
 
 
 def _side(thread: ReconosThread, mapping: Mapping | None) -> Side:
@@ -93,14 +94,14 @@ def _side(thread: ReconosThread, mapping: Mapping | None) -> Side:
     return Side.HARDWARE if in_hardware else Side.SOFTWARE
 
 
-def _notes(configuration: BuildConfiguration, *, inner: bool) -> tuple[str, ...]:
+def _notes(configuration: BuildConfiguration, outside: list[str]) -> tuple[str, ...]:
     types = {resource.type for resource in configuration.resources}
     notes = []
     if types & {"rossrvs", "rossrvc", "rosactions", "rosactionc"}:
         notes.append("Services and actions are left out: they stay in software.")
-    if not inner:
-        notes.append(
-            f"{OUTSIDE}, in software, stands for ends that the project does not have: clients, other boards."
-        )
+    notes += [
+        f"{name}, in software, stands for ends that the project does not have: clients, other boards."
+        for name in outside
+    ]
     notes.append("A topic with publishers and subscribers in the project is taken to have no others.")
     return tuple(notes)

@@ -13,7 +13,7 @@ from mapped_graphs import EXAMPLE, graphs
 
 from reconros_zenoh.errors import UsageError
 from reconros_zenoh.mapping.communication import TopicMapping, crossing_edges, map_topics
-from reconros_zenoh.mapping.drawing import dot, write_drawing
+from reconros_zenoh.mapping.drawing import _columns, _way, _width, dot, write_drawing
 from reconros_zenoh.mapping.graph import ComputationGraph, Side, Topic
 from reconros_zenoh.mapping.graph_file import read_graph_file
 from reconros_zenoh.mapping.layout import ends_of, in_hardware, lay_out
@@ -136,3 +136,32 @@ def test_a_long_chain_is_drawn_smaller(tmp_path: Path) -> None:
     write_drawing(tmp_path / "graph.png", graph, mappings_of(graph))
     width = int.from_bytes((tmp_path / "graph.png").read_bytes()[16:20], "big")
     assert 25_000 < width <= 30_000
+
+
+def ends(column: tuple[float, float], width: float) -> tuple[float, float]:
+    """Return where a vertex of this width begins and ends in its column."""
+    middle = sum(column) / 2
+    return middle - width / 2, middle + width / 2
+
+
+@given(graphs())
+def test_no_edge_passes_behind_a_vertex(graph: ComputationGraph) -> None:
+    mappings = mappings_of(graph)
+    layout = lay_out(graph, mappings)
+    widths = {vertex: _width(vertex, mappings) for vertex in layout.vertices}
+    columns = _columns(layout, widths)
+    for edge, places in layout.ways.items():
+        source, target = ends_of(edge)
+        points = _way(places, columns, [widths[source] / 2, widths[target] / 2])
+        forward = points[0][0] < points[-1][0]
+        first, last = (ends(columns[layout.vertices[end].column], widths[end]) for end in (source, target))
+        assert points[0][0] == pytest.approx(first[forward])
+        assert points[-1][0] == pytest.approx(last[not forward])
+        for (x, y), (next_x, next_y) in pairwise(points):
+            assert x != next_x
+            # It changes its height between two columns only.
+            if y != next_y:
+                borders = sorted((x, next_x))
+                assert any(
+                    borders == pytest.approx([end, start]) for (_, end), (start, _) in pairwise(columns)
+                )

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 HW, SW = Side.HARDWARE, Side.SOFTWARE
+FROM_OUTSIDE, TO_OUTSIDE = OUTSIDE.values()
 
 
 def topics(graph: ComputationGraph) -> dict[str, tuple[str, str]]:
@@ -27,9 +28,9 @@ def topics(graph: ComputationGraph) -> dict[str, tuple[str, str]]:
 
 def test_nodes_and_topics_have_their_full_names(tmp_path: Path) -> None:
     graph = read_project_graph(read(tmp_path))
-    assert graph.nodes == {"/edge": HW, "/vision/lane": HW, "/viewer": SW, OUTSIDE: SW}
+    assert graph.nodes == {"/edge": HW, "/vision/lane": HW, "/viewer": SW, FROM_OUTSIDE: SW}
     assert topics(graph) == {
-        "/image": (OUTSIDE, "/edge /vision/lane"),
+        "/image": (FROM_OUTSIDE, "/edge /vision/lane"),
         "/edges": ("/edge", "/vision/lane"),
         "/vision/lane/found": ("/vision/lane", "/viewer"),
     }
@@ -39,7 +40,7 @@ def test_nodes_and_topics_have_their_full_names(tmp_path: Path) -> None:
         "/vision/lane/found": TopicMapping.SOFTWARE,
     }
     assert any("Services and actions are left out" in note for note in graph.notes)
-    assert any(OUTSIDE in note for note in graph.notes)
+    assert any(FROM_OUTSIDE in note for note in graph.notes)
 
 
 def test_what_nobody_in_the_project_reads_leaves_it(tmp_path: Path) -> None:
@@ -47,7 +48,7 @@ def test_what_nobody_in_the_project_reads_leaves_it(tmp_path: Path) -> None:
         "[ReconosThread@lane]\nSlot = slot(1)\nHwSource = hls\nResourceGroup = lane\n"
     )
     graph = read_project_graph(read(tmp_path, alone))
-    assert topics(graph)["/vision/lane/found"] == ("/vision/lane", OUTSIDE)
+    assert topics(graph)["/vision/lane/found"] == ("/vision/lane", TO_OUTSIDE)
     # No thread uses the group of /edge: main.py does, in software.
     assert graph.nodes["/edge"] is SW
     assert not any("Services" in note for note in graph.notes)
@@ -73,7 +74,8 @@ def test_a_mapping_decides_what_is_in_hardware(tmp_path: Path) -> None:
 def test_a_node_with_callbacks_on_both_sides_is_a_node_on_each(tmp_path: Path) -> None:
     both = CAMERA.replace('"/vision/lane"', '"/edge"').replace("HwSource = hls\nSwSource", "SwSource")
     graph = read_project_graph(read(tmp_path, both))
-    assert graph.nodes == {"/edge (hardware)": HW, "/edge (software)": SW, "/viewer": SW, OUTSIDE: SW}
+    inside = {"/edge (hardware)": HW, "/edge (software)": SW, "/viewer": SW}
+    assert graph.nodes == inside | {FROM_OUTSIDE: SW, TO_OUTSIDE: SW}
     assert topics(graph)["/edges"] == ("/edge (hardware)", "/edge (software)")
 
 
@@ -91,7 +93,7 @@ def test_a_gateway_has_ends_in_software_even_if_the_project_has_none(tmp_path: P
     edges = gateway("edges", 2, "/stream", "/edges")
     assert topics(read_project_graph(read(tmp_path, CAMERA + edges)))["/edges"] == (
         "/edge",
-        f"/vision/lane {OUTSIDE}",
+        f"/vision/lane {TO_OUTSIDE}",
     )
 
 
@@ -109,6 +111,7 @@ def test_the_shipped_project() -> None:
         "/mnist_node": HW,
         "/sobel_node": HW,
         "/hash_node": SW,
-        OUTSIDE: SW,
+        FROM_OUTSIDE: SW,
+        TO_OUTSIDE: SW,
     }
-    assert Topic("/image_raw", (OUTSIDE,), ("/sobel_node",)) in graph.topics
+    assert Topic("/image_raw", (FROM_OUTSIDE,), ("/sobel_node",)) in graph.topics
