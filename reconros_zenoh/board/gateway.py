@@ -128,7 +128,7 @@ class Gateway:
         read = Signal()
         Activity(self._read(event.size, read))
         try:
-            yield from self._topic.publish(self, event.message, event.size, event.timeline, sender)
+            yield from self._topic.publish(self, event.message, event.size, event.timeline, sender, read)
             self.to_hmt += 1
         except BadMessageError as error:
             self.refused += 1

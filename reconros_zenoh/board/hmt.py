@@ -54,6 +54,7 @@ class FifoPlan:
 class Streamed(NamedTuple):
     """A message on its way over a stream; `complete` fires when its last word is there.
 
+    `read` fires when its last word has come from where it is read; None where all is there from the start.
     `publisher` wrote it to the stream, for the filters; `sender` sent it first, for the log: the gid in
     hexadecimal of who published it in software, or the name of the hardware callback.
     """
@@ -65,6 +66,7 @@ class Streamed(NamedTuple):
     timeline: Timeline
     complete: Signal
     sender: str | None
+    read: Signal | None
 
 
 class Fifo:
@@ -176,9 +178,15 @@ class HardwareTopic:
         self._tap = Stream(put, QosProfile().depth)
 
     def publish(
-        self, publisher: Hashable, message: Any, size: int, timeline: Timeline, sender: str | None = None
+        self,
+        publisher: Hashable,
+        message: Any,
+        size: int,
+        timeline: Timeline,
+        sender: str | None = None,
+        read: Signal | None = None,
     ) -> Generator[Awaitable, object, None]:
-        """Return when the message of `size` bytes on the wire has passed; `sender` as in `Streamed`.
+        """Return when the message of `size` bytes on the wire has passed; the others as in `Streamed`.
 
         Raise BadMessageError when it is larger than somebody's FIFO.
         """
@@ -195,7 +203,7 @@ class HardwareTopic:
             yield full.room
         # All places at once: who held one while waiting for another could keep a third from going on.
         targets = [fifo for fifo in fifos if fifo.reserve()]
-        streamed = Streamed(publisher, message, size, targets, timeline, Signal(), sender)
+        streamed = Streamed(publisher, message, size, targets, timeline, Signal(), sender, read)
         self._passages.put(streamed)
         yield streamed.complete
         if self._tap is not None:
@@ -209,6 +217,8 @@ class HardwareTopic:
         duration_ns = round(streamed.size * self._ns_per_byte)
         if duration_ns:
             yield self._board.environment.timeout(duration_ns)
+        if streamed.read is not None:
+            yield streamed.read
         # First whoever has waited for the last word: a gateway has a longer way to go than the others.
         streamed.complete.fire()
         for fifo in streamed.targets:
