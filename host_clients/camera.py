@@ -60,7 +60,7 @@ class Camera:
         yield from self._source.until_matched(options.wait_s)
         yield start
         for number in range(options.pictures):
-            self._source.publish(number, moving_picture(number))
+            self._source.publish(str(number), moving_picture(number))
             self.sent += 1
             yield self._environment.timeout(round(_SECOND_NS / options.rate_hz))
         yield self._environment.timeout(_ON_THE_WAY_NS)

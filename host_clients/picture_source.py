@@ -25,7 +25,7 @@ _SECOND_NS = 1_000_000_000
 class PictureSource:
     """A publisher of pictures, uint8[height, width, 3] in the order blue, green, red.
 
-    The header carries when a picture was sent (the context's clock) and, as frame_id, its number.
+    The header carries when a picture was sent (the context's clock) and, as frame_id, its name.
     """
 
     def __init__(self, environment: VirtualEnvironment, node: Node, types: TypeRegistry) -> None:
@@ -46,12 +46,12 @@ class PictureSource:
                 "Start a board that takes pictures, with the same --router and --domain."
             )
 
-    def publish(self, number: int, picture: NDArray[np.uint8]) -> int:
+    def publish(self, name: str, picture: NDArray[np.uint8]) -> int:
         """Publish a picture and return its time [ns]."""
         message = image_message(self._types, "bgr8", picture)
         now_ns = self._node.context.clock_ns()
         message.header.stamp.sec, message.header.stamp.nanosec = divmod(now_ns, _SECOND_NS)
-        message.header.frame_id = str(number)
+        message.header.frame_id = name
         self._publisher.publish(message)
         return now_ns
 

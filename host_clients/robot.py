@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import dropwhile
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from host_clients.picture_source import PictureSource
@@ -11,7 +12,7 @@ from reconros_zenoh.errors import BadMessageError
 from reconros_zenoh.measure.record import RoundTrip
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Generator
+    from collections.abc import Callable, Generator, Sequence
     from pathlib import Path
 
     import numpy as np
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
 RATE_HZ = 10.0
 _SECOND_NS = 1_000_000_000
 _ON_THE_WAY_NS = 2 * _SECOND_NS
+_PATIENCE_NS = _SECOND_NS // 2
 _FASTEST = 10.0
 
 
@@ -52,12 +54,24 @@ class Step(NamedTuple):
     red: bool
 
 
+def most_off_lane_mm(steps: Sequence[Step]) -> float:
+    """Return how far the robot was beside the middle of the lane at most."""
+    return max(abs(step.off_lane) for step in steps) * 1e3
+
+
+def stood_s(steps: Sequence[Step], *, red: bool) -> float:
+    """Return how long the robot, once it had begun to drive, stood while the light was red, or was not."""
+    under_way = dropwhile(lambda step: not step.speed, steps)
+    return sum(not step.speed and step.red is red for step in under_way) / RATE_HZ
+
+
 class DrivingRobot:
     """Publishes ten pictures a second on /image_raw, and does what comes on /drive.
 
-    It begins once somebody subscribes, and fails with TransportError when nobody does. `done` happens 2 s
-    after the last picture. `on_trip` gets for each picture how long it took until its command was here; those
-    without one are `lost` at the end. `unexpected` counts commands for no picture of this robot.
+    It stops when no command has come for half a second. It begins once somebody subscribes, and fails
+    with TransportError when nobody does. `done` happens 2 s after the last picture. `on_trip` gets for
+    each picture how long it took until its command was here; those without one are `lost` at the end.
+    `unexpected` counts commands for no picture of this robot.
     """
 
     def __init__(
@@ -79,7 +93,8 @@ class DrivingRobot:
         self._robot = Robot()
         self._world = World()
         self._moved_ns = environment.now
-        self._taken_ns: dict[str, int] = {}
+        self._commanded_ns = environment.now
+        self._taken: dict[str, tuple[int, int]] = {}
         self._node = context.node("robot")
         self._node.subscription(
             types.message("geometry_msgs/msg/TwistStamped"), "/drive", self._arrive, check=_check
@@ -90,7 +105,7 @@ class DrivingRobot:
     @property
     def unanswered(self) -> int:
         """How many pictures have no command yet."""
-        return len(self._taken_ns)
+        return len(self._taken)
 
     def _run(self) -> Generator[simpy.Event, object, None]:
         options = self._options
@@ -99,15 +114,18 @@ class DrivingRobot:
             self._take_picture(number)
             yield self._environment.timeout(round(_SECOND_NS / RATE_HZ))
         yield self._environment.timeout(_ON_THE_WAY_NS)
-        for unanswered in self._taken_ns:
-            self._on_trip(RoundTrip(int(unanswered), None, "lost"))
+        for number, _ in self._taken.values():
+            self._on_trip(RoundTrip(number, None, "lost"))
 
     def _take_picture(self, number: int) -> None:
         self._move()
+        if self._environment.now - self._commanded_ns > _PATIENCE_NS:
+            self._robot.speed = self._robot.turn = 0.0
         robot, seconds = self._robot, number / RATE_HZ
         self.steps.append(Step(seconds, robot.x, robot.y, robot.off_lane, robot.speed, is_red(seconds)))
         picture = self._world.picture(robot, seconds, number)
-        self._taken_ns[str(number)] = self._source.publish(number, picture)
+        name = f"{self._node.context.transport.session_id}.{number}"  # other robots have other sessions
+        self._taken[name] = number, self._source.publish(name, picture)
         self._on_picture(picture, robot.speed)
 
     def _arrive(self, received: Received) -> None:
@@ -115,14 +133,15 @@ class DrivingRobot:
         self._environment.post(self._obey, received.message, self._node.context.clock_ns())
 
     def _obey(self, command: Any, arrived_ns: int) -> None:
-        number = command.header.frame_id
-        taken_ns = self._taken_ns.pop(number, None)
-        if taken_ns is None:
+        taken = self._taken.pop(command.header.frame_id, None)
+        if taken is None:
             self.unexpected += 1
             return
+        number, taken_ns = taken
         self._move()
+        self._commanded_ns = self._environment.now
         self._robot.speed, self._robot.turn = command.twist.linear.x, command.twist.angular.z
-        self._on_trip(RoundTrip(int(number), arrived_ns - taken_ns, "ok"))
+        self._on_trip(RoundTrip(number, arrived_ns - taken_ns, "ok"))
 
     def _move(self) -> None:
         """Let the robot go on as it was told until now."""

@@ -100,11 +100,23 @@ def robot(
     last picture. robot.csv has the times from picture to command.
     """
     from host_clients.desktop import run_robot
-    from host_clients.robot import RobotOptions
+    from host_clients.robot import RobotOptions, most_off_lane_mm, stood_s
 
     driven = run_robot(RobotOptions(router, pictures, out, view, wait, domain), partial(_tell, "robot"))
-    answered = len(driven.steps) - driven.unanswered
-    print(f"robot: {len(driven.steps)} pictures published, {answered} answered", flush=True)
+    pictures = len(driven.steps)
+    print(f"robot: {pictures} pictures published, {pictures - driven.unanswered} answered", flush=True)
+    if driven.unexpected:
+        print(f"robot: {driven.unexpected} other commands came, for no picture of this robot", flush=True)
+    if driven.steps:
+        beside_mm, at_red_s, else_s = (
+            most_off_lane_mm(driven.steps),
+            *(stood_s(driven.steps, red=red) for red in (True, False)),
+        )
+        print(
+            f"robot: at most {beside_mm:.0f} mm beside the middle of the lane; stood for {at_red_s:.1f} s at "
+            f"the red light, {else_s:.1f} s else",
+            flush=True,
+        )
     raise typer.Exit(0 if driven.done.triggered else 130)
 
 

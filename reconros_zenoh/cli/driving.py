@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from rich.text import Text
 
 from reconros_zenoh.cli.console import interrupted, titled_table, wide_console
 from reconros_zenoh.cli.options import AsJson, Out, Profile
@@ -24,9 +25,8 @@ _ROWS = {
     "chain_mean_ms": "whole chain",
     "chain_sd_ms": "its standard deviation",
     "paper_mean_ms": "the paper's chain",
-    "paper_sd_ms": "its standard deviation",
-    "loop_median_ms": "picture to command, median",
-    "most_off_lane_mm": "most beside the lane's middle [mm]",
+    "paper_sd_ms": "the paper's standard deviation",
+    "loop_median_ms": "robot's picture to its command",
 }
 
 
@@ -42,15 +42,15 @@ def driving(
 
     A robot's nodes compensate, blur and plan in slots; ORB key points are found in software. In virtual time,
     with every topic in memory, then with streams between the nodes in hardware, then with a gateway, too.
-    Exit status 0 only if every picture was answered and the robot kept its lane and stood at the red light.
+    Exit status 0 only if every picture had its command and the robot kept its lane and heeded the light.
     """
     from reconros_zenoh.board.profile import read_profile
     from reconros_zenoh.experiments.driving import (
         VARIANTS,
-        all_right,
         check_profile,
         run_variant,
         summary,
+        troubles,
         write_records,
     )
     from reconros_zenoh.experiments.interruption import until_interrupted
@@ -72,17 +72,18 @@ def driving(
         experiment = summary(board, pictures, drives, interrupted=interruption.happened)
         write_records(out, drives)
         write_experiment(out, experiment)
+        if as_json:
+            print(json.dumps(experiment))
+        elif drives:
+            _print(wide_console(), experiment, troubles(experiment))
+            print(f"records and experiment.json are in {out}")
         if drives:
             _draw(out / _DRAWING, experiment, drives)
-    if as_json:
-        print(json.dumps(experiment))
-    elif drives:
-        _print(wide_console(), experiment)
-        print(f"records and experiment.json are in {out}")
-        print(f"drawn to {out / _DRAWING}")
+            if not as_json:
+                print(f"drawn to {out / _DRAWING}")
     if interruption.happened:
         raise interrupted(quiet=as_json, measured=bool(drives))
-    raise typer.Exit(0 if all_right(experiment) else 1)
+    raise typer.Exit(1 if troubles(experiment) else 0)
 
 
 def _draw(path: Path, experiment: dict[str, Any], drives: dict[str, Drive]) -> None:
@@ -104,8 +105,8 @@ def _draw(path: Path, experiment: dict[str, Any], drives: dict[str, Drive]) -> N
     write_figure(figure, path)
 
 
-def _print(console: Console, experiment: dict[str, Any]) -> None:
-    table = titled_table("the chain from Image Compensation to Lane Control, mean [ms]", 1)
+def _print(console: Console, experiment: dict[str, Any], troubles: list[str]) -> None:
+    table = titled_table("the chain from Image Compensation to Lane Control: means in ms", 1)
     table.add_column("")
     for variant in experiment["variants"]:
         table.add_column(variant, justify="right", no_wrap=True)
@@ -118,3 +119,5 @@ def _print(console: Console, experiment: dict[str, Any]) -> None:
     for anchor in experiment["anchors"]:
         error = format_error(anchor["error"])
         console.print(f"{anchor['name']}: {anchor['ours']:.2f}, paper {anchor['paper']:.2f} ({error})")
+    for trouble in troubles:
+        console.print(Text(trouble, style="yellow"))

@@ -9,13 +9,13 @@ from reconros_zenoh.applications.driving.kernels import (
     LANE_WIDTH,
     blur,
     compensate,
-    drive,
     find_key_points,
     fit_lane,
+    lets_pass,
     match_key_points,
     plan_lane,
-    shows_green,
     shows_red,
+    steer,
 )
 from reconros_zenoh.applications.driving.view import (
     HEIGHT,
@@ -23,7 +23,7 @@ from reconros_zenoh.applications.driving.view import (
     ground_of_birds_view,
     horizon,
     picture_of_ground,
-    place,
+    pixel_of,
 )
 from reconros_zenoh.applications.driving.world import GREEN_S, RADIUS, RED_S, Robot, World, is_red
 
@@ -38,8 +38,8 @@ def lane_of(robot: Robot) -> tuple[float, float, float, int]:
 def test_a_point_on_the_ground_is_where_the_homography_says() -> None:
     for x, y in ((0.5, 0.1), (1.5, -0.4), (3.0, 0.0)):
         column, row, depth = picture_of_ground() @ (x, y, 1)
-        assert place(x, y, 0.0) == pytest.approx((column / depth, row / depth, depth))
-    assert place(1e9, 0.0, 0.0)[1] == pytest.approx(horizon())
+        assert pixel_of(x, y, 0.0) == pytest.approx((column / depth, row / depth, depth))
+    assert pixel_of(1e9, 0.0, 0.0)[1] == pytest.approx(horizon())
 
 
 def test_the_birds_view_begins_before_the_robot_and_looks_ahead() -> None:
@@ -71,7 +71,7 @@ def test_a_robot_on_the_right_sees_the_lane_on_its_left() -> None:
     robot = Robot(RADIUS + 0.08, 0.0)
     offset, *_ = lane_of(robot)
     assert offset == pytest.approx(robot.off_lane, abs=0.015)
-    assert drive(offset, 0.0, 0.0)[1] > 0  # to the left
+    assert steer(offset, 0.0, 0.0)[1] > 0  # to the left
 
 
 def test_without_lines_there_is_no_lane() -> None:
@@ -80,18 +80,35 @@ def test_without_lines_there_is_no_lane() -> None:
 
 
 def test_a_lane_straight_ahead_needs_no_turn() -> None:
-    assert drive(0.0, 0.0, 0.0) == (0.5, 0.0)
-    speed, turn = drive(0.0, 0.0, 1 / (2 * RADIUS))
+    assert steer(0.0, 0.0, 0.0) == (0.5, 0.0)
+    speed, turn = steer(0.0, 0.0, 1 / (2 * RADIUS))
     assert turn == pytest.approx(speed / RADIUS, rel=0.05)
 
 
 def test_the_light_is_seen_only_near_and_in_its_colour() -> None:
     for metres, seen in ((0.0, False), (1.2, True), (3.0, False)):
         red, green = (compensate(WORLD.picture(Robot.after(metres), s, 0)) for s in (0.0, RED_S))
-        assert (shows_red(red), shows_green(red)) == (seen, False)
-        assert (shows_red(green), shows_green(green)) == (False, seen)
-    assert not is_red(RED_S)
-    assert is_red(RED_S + GREEN_S)
+        assert (shows_red(red), lets_pass(red)) == (seen, not seen)
+        assert (shows_red(green), lets_pass(green)) == (False, True)
+        assert np.any(red != green) == seen
+
+
+@pytest.mark.parametrize("turn", [0, 1, 7])
+def test_the_light_changes_for_ever(turn: int) -> None:
+    begin = turn * (RED_S + GREEN_S)
+    assert [is_red(begin + seconds) for seconds in (0, RED_S - 0.1, RED_S, RED_S + GREEN_S - 0.1)] == [
+        True,
+        True,
+        False,
+        False,
+    ]
+
+
+def test_the_filter_takes_the_edges_off() -> None:
+    picture = np.zeros((HEIGHT, WIDTH, 3), np.uint8)
+    picture[:, WIDTH // 2 :] = 255
+    assert np.abs(np.diff(blur(picture).astype(int), axis=1)).max() < 128
+    assert np.array_equal(blur(picture)[:, :100], picture[:, :100])
 
 
 def test_key_points_of_a_picture_are_found_again() -> None:

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from host_clients.robot import DrivingRobot, RobotOptions
+from host_clients.robot import DrivingRobot, RobotOptions, Step, most_off_lane_mm, stood_s
 from reconros_zenoh.applications.driving.world import RADIUS
 from reconros_zenoh.clock.virtual import VirtualEnvironment
 from reconros_zenoh.measure.record import RoundTrip
@@ -18,16 +18,18 @@ MS = 1_000_000
 
 
 class Drive:
-    """A robot that takes three pictures, and a driver that answers what `command` returns for each."""
+    """A robot that takes some pictures, and a driver that answers what `command` returns for each."""
 
-    def __init__(self, command: Any) -> None:
+    def __init__(self, command: Any, pictures: int = 3) -> None:
         self.environment, types = VirtualEnvironment(), TypeRegistry()
         network = SimulatedNetwork(self.environment)
         self.here, there = (
             Context(network.transport(name), 0, self.environment.clock_ns) for name in ("a1", "b2")
         )
         self.trips: list[RoundTrip] = []
-        self.robot = DrivingRobot(self.environment, self.here, types, RobotOptions("", 3), self.trips.append)
+        self.robot = DrivingRobot(
+            self.environment, self.here, types, RobotOptions("", pictures), self.trips.append
+        )
         twist, vector, header = (
             types.message(name).cls
             for name in ("geometry_msgs/msg/Twist", "geometry_msgs/msg/Vector3", "std_msgs/msg/Header")
@@ -37,7 +39,7 @@ class Drive:
 
         def answer(received: Any) -> None:
             picture = received.message.header
-            found = command(int(picture.frame_id))
+            found = command(picture.frame_id)
             if found is not None:
                 number, speed, turn = found
                 motion = twist(linear=vector(x=speed, y=0.0, z=0.0), angular=vector(x=0.0, y=0.0, z=turn))
@@ -51,7 +53,7 @@ class Drive:
 
 
 def test_it_drives_as_it_is_told_and_notes_how_long_it_took() -> None:
-    drive = Drive(lambda number: (str(number), 0.5, 0.0))
+    drive = Drive(lambda name: (name, 0.5, 0.0))
     assert drive.trips == [RoundTrip(number, 5 * MS, "ok") for number in range(3)]
     assert [step.speed for step in drive.robot.steps] == [0.0, 0.5, 0.5]
     # Straight on, along the tangent, from 5 ms on.
@@ -61,15 +63,15 @@ def test_it_drives_as_it_is_told_and_notes_how_long_it_took() -> None:
 
 
 def test_a_picture_without_a_command_is_lost() -> None:
-    drive = Drive(lambda number: None if number == 1 else (str(number), 0.0, 0.0))
+    drive = Drive(lambda name: None if name == "a1.1" else (name, 0.0, 0.0))
     assert [(trip.index, trip.outcome) for trip in drive.trips] == [(0, "ok"), (2, "ok"), (1, "lost")]
 
 
-@pytest.mark.parametrize("number", ["7", "", "none", "0"])
+@pytest.mark.parametrize("number", ["a1.7", "", "0", "b2.0", "a1.0"])
 def test_a_command_for_no_picture_is_not_obeyed(number: str) -> None:
     """Nor is a second one for the same picture."""
     drive = Drive(lambda _: (number, 1.0, 0.0))
-    first = 1 if number == "0" else 0
+    first = 1 if number == "a1.0" else 0
     assert drive.robot.unexpected == 3 - first
     assert [trip.outcome for trip in drive.trips].count("ok") == first
 
@@ -79,7 +81,25 @@ def test_a_command_for_no_picture_is_not_obeyed(number: str) -> None:
     [(float("nan"), 0.0, "speed"), (1e300, 0.0, "speed"), (0.0, float("-inf"), "turn")],
 )
 def test_what_no_robot_can_do_is_refused(speed: float, turn: float, reason: str) -> None:
-    drive = Drive(lambda number: (str(number), speed, turn))
+    drive = Drive(lambda name: (name, speed, turn))
     assert drive.here.rejections.counts() == {reason: 3}
     assert [trip.outcome for trip in drive.trips] == ["lost"] * 3
     assert {(step.x, step.y) for step in drive.robot.steps} == {(RADIUS, 0)}
+
+
+def test_it_stops_when_no_command_has_come_for_half_a_second() -> None:
+    drive = Drive(lambda name: (name, 0.5, 0.0) if name in {"a1.0", "a1.1"} else None, pictures=10)
+    # The last command came 5 ms behind the second picture, at 0.1 s.
+    assert [step.speed for step in drive.robot.steps] == [0.0, *[0.5] * 6, 0.0, 0.0, 0.0]
+
+
+def test_what_is_told_of_a_drive() -> None:
+    steps = [
+        Step(0.0, 0.0, 0.0, 0.0, 0.0, True),  # not yet begun
+        Step(0.1, 0.0, 0.0, -0.02, 0.5, True),
+        Step(0.2, 0.0, 0.0, 0.01, 0.0, True),
+        Step(0.3, 0.0, 0.0, 0.0, 0.0, False),
+        Step(0.4, 0.0, 0.0, 0.0, 0.0, False),
+    ]
+    assert most_off_lane_mm(steps) == 20
+    assert (stood_s(steps, red=True), stood_s(steps, red=False)) == (0.1, 0.2)

@@ -20,10 +20,11 @@ class Chain:
         self._reached_ns: dict[str, list[int]] = {}
 
     def note(self, station: str, number: str) -> None:
-        """Note that a station has the picture of this number; the first one begins it anew."""
+        """Note that a station has the picture of this number, if the first one had it, too."""
         if station == STATIONS[0]:
             self._reached_ns[number] = []
-        self._reached_ns[number].append(self._clock_ns())
+        if number in self._reached_ns:
+            self._reached_ns[number].append(self._clock_ns())
 
     def sections_ns(self) -> dict[str, list[int]]:
         """Return the times [ns] from station to station of each picture that came through, by its number."""

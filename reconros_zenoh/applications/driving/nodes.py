@@ -10,16 +10,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from reconros_zenoh.applications.driving.kernels import drive, find_key_points, fit_lane, match_key_points
+from reconros_zenoh.applications.driving.kernels import find_key_points, fit_lane, match_key_points, steer
 from reconros_zenoh.applications.driving.view import HEIGHT, WIDTH
 from reconros_zenoh.applications.roundtrip.callbacks.checks import check_image
+from reconros_zenoh.errors import BadMessageError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator
 
     from numpy.typing import NDArray
 
-    from reconros_zenoh.applications.driving.chain import Chain
     from reconros_zenoh.board.callback import HardwareThread
     from reconros_zenoh.board.endpoints import MessageWriter
     from reconros_zenoh.board.os_resources import Mailbox
@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 
     Picture = NDArray[np.uint8]
     Steps = Generator[Awaitable, object, None]
+    Note = Callable[[str, str], None]
+    """Hears that a station of the chain has the picture of this number."""
 
 _WATCH = 1
 
@@ -38,14 +40,25 @@ def check_picture(message: Any) -> None:
     check_image(message, "bgr8", HEIGHT, WIDTH, 3)
 
 
+def check_birds_view(message: Any) -> None:
+    """Raise BadMessageError for what the lane planner does not publish."""
+    check_image(message, "mono8", HEIGHT, WIDTH, 1)
+
+
+def check_lane(message: Any) -> None:
+    """Raise BadMessageError for a lane along which nobody can drive."""
+    if not np.isfinite((message.offset, message.slope, message.curvature)).all():
+        raise BadMessageError("lane", "the lane is not finite")
+
+
 class Filter:
     """Publishes a picture for each that comes: Image Compensation, Gaussian Blur and Lane Planner."""
 
     def __init__(
-        self, station: str, chain: Chain, kernel: Callable[[Picture], Picture], publisher: MessageWriter
+        self, station: str, note: Note, kernel: Callable[[Picture], Picture], publisher: MessageWriter
     ) -> None:
         self._station = station
-        self._chain = chain
+        self._note = note
         self._kernel = kernel
         self._publisher = publisher
 
@@ -53,7 +66,7 @@ class Filter:
         """Publish what the kernel makes of the picture."""
         message = yield from thread.get_init_data()
         picture = yield from _read(thread, message)
-        self._chain.note(self._station, message.header.frame_id)
+        self._note(self._station, message.header.frame_id)
         result = yield from thread.compute(self._kernel, picture)
         yield from thread.mem_write(result, to=self._publisher)
         image = self._publisher.message(
@@ -71,15 +84,15 @@ class Filter:
 class Polyfit:
     """Publishes the lane that it sees in the bird's view."""
 
-    def __init__(self, chain: Chain, publisher: MessageWriter) -> None:
-        self._chain = chain
+    def __init__(self, note: Note, publisher: MessageWriter) -> None:
+        self._note = note
         self._publisher = publisher
 
     def hardware(self, thread: HardwareThread) -> Steps:
         """Publish the lane."""
         message = yield from thread.get_init_data()
         lines = yield from _read(thread, message)
-        self._chain.note("polyfit", message.header.frame_id)
+        self._note("polyfit", message.header.frame_id)
         offset, slope, curvature, pixels = yield from thread.compute(fit_lane, lines)
         lane = self._publisher.message(
             header=message.header, offset=offset, slope=slope, curvature=curvature, pixels=pixels
@@ -88,14 +101,14 @@ class Polyfit:
 
 
 class LightDetection:
-    """Publishes the header of a picture with its traffic light, then no more until it is told to watch again.
+    """Publishes the header of a picture that tells of its light, then none until it has to watch again.
 
     Deviation: a callback has one source, so the node's subscription to the other detection is a callback of
     its own, in software, which tells this one with a word in a mailbox.
     """
 
-    def __init__(self, shows: Callable[[Picture], bool], publisher: MessageWriter, watch: Mailbox) -> None:
-        self._shows = shows
+    def __init__(self, tells: Callable[[Picture], bool], publisher: MessageWriter, watch: Mailbox) -> None:
+        self._tells = tells
         self._publisher = publisher
         self._watch = watch
 
@@ -104,12 +117,12 @@ class LightDetection:
         self._watch.try_put(_WATCH)
 
     def hardware(self, thread: HardwareThread) -> Steps:
-        """Publish the picture's header if it has the light and this node watches."""
+        """Publish the picture's header if it tells of the light and this node watches."""
         message = yield from thread.get_init_data()
         picture = yield from _read(thread, message)
         if (yield from thread.mbox_tryget(self._watch)) is None:
             return
-        if (yield from thread.compute(self._shows, picture)):
+        if (yield from thread.compute(self._tells, picture)):
             header = message.header
             yield from thread.publish(
                 self._publisher, self._publisher.message(stamp=header.stamp, frame_id=header.frame_id)
@@ -125,8 +138,8 @@ class LightDetection:
 class LaneControl:
     """Publishes a command for each lane: to drive along it, or to stand, at a red light or without a lane."""
 
-    def __init__(self, chain: Chain, publisher: MessageWriter, types: TypeRegistry) -> None:
-        self._chain = chain
+    def __init__(self, note: Note, publisher: MessageWriter, types: TypeRegistry) -> None:
+        self._note = note
         self._publisher = publisher
         self._twist = types.message("geometry_msgs/msg/Twist").cls
         self._vector = types.message("geometry_msgs/msg/Vector3").cls
@@ -134,10 +147,10 @@ class LaneControl:
 
     def on_lane(self, lane: Any, context: SoftwareContext) -> None:
         """Publish the command."""
-        self._chain.note("lane_control", lane.header.frame_id)
+        self._note("lane_control", lane.header.frame_id)
         speed, turn = 0.0, 0.0
         if lane.pixels and not self._halted:
-            speed, turn = drive(lane.offset, lane.slope, lane.curvature)
+            speed, turn = steer(lane.offset, lane.slope, lane.curvature)
         twist = self._twist(
             linear=self._vector(x=speed, y=0.0, z=0.0), angular=self._vector(x=0.0, y=0.0, z=turn)
         )

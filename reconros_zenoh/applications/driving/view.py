@@ -48,7 +48,7 @@ def ground_of_birds_view() -> Matrix:
     return np.array([[0, -1 / PIXELS_PER_METRE, far], [-1 / PIXELS_PER_METRE, 0, LEFT], [0, 0, 1]])
 
 
-def place(x: float, y: float, z: float) -> tuple[float, float, float]:
+def pixel_of(x: float, y: float, z: float) -> tuple[float, float, float]:
     """Return column, row and depth [m] of a point `z` above the ground."""
     depth = x * _COS + (CAMERA_HEIGHT - z) * _SIN
     down = (CAMERA_HEIGHT - z) * _COS - x * _SIN

@@ -16,7 +16,7 @@ from reconros_zenoh.applications.driving.view import (
     WIDTH,
     horizon,
     picture_of_ground,
-    place,
+    pixel_of,
 )
 
 if TYPE_CHECKING:
@@ -119,8 +119,8 @@ class World:
         ahead, aside = float(dx * cos + dy * sin), float(dy * cos - dx * sin)
         if not _LIGHT_SEEN[0] < ahead < _LIGHT_SEEN[1]:
             return
-        column, row, depth = place(ahead, aside, _LIGHT_HEIGHT)
-        _, foot, _ = place(ahead, aside, 0.0)
+        column, row, depth = pixel_of(ahead, aside, _LIGHT_HEIGHT)
+        _, foot, _ = pixel_of(ahead, aside, 0.0)
         centre, thick = (round(column), round(row)), max(1, round(0.02 * FOCAL_LENGTH / depth))
         cv2.line(picture, centre, (round(column), round(foot)), _POST, thick)
         colour = _RED if is_red(seconds) else _GREEN
