@@ -272,6 +272,30 @@ def test_a_node_that_nobody_observes_takes_pictures_of_others() -> None:
     assert hosted.executor.failures.total() == 0
 
 
+def test_each_detection_tells_once_and_watches_again_when_the_other_has_told() -> None:
+    with as_file(files("reconros_zenoh.applications.driving")) as folder:
+        project = load_project(folder)
+    types = project.types()
+    told: list[tuple[str, str]] = []
+    seen = {"none": (Robot(), 0.0), "red": (Robot.after(1.2), 0.0), "green": (Robot.after(1.2), RED_S)}
+    with Simulation(types) as simulation:
+        simulation.add_board(PROFILE, project, project.mapping(None), BoardOptions())
+        foreign = simulation.context().node("foreign")
+        publisher = foreign.publisher(types.message("sensor_msgs/msg/Image"), "/image")
+        for colour in ("red", "green"):
+            foreign.subscription(
+                types.message("std_msgs/msg/Header"),
+                f"/{colour}_light",
+                lambda received, colour=colour: told.append((colour, received.message.frame_id)),
+            )
+        for number, what in enumerate(("none", "green", "red", "red", "green", "red", "none", "none")):
+            picture = image_message(types, "bgr8", World().picture(*seen[what], number))
+            picture.header.frame_id = f"{number} {what}"
+            simulation.environment.call_later(1_000_000 + number * 200_000_000, publisher.publish, picture)
+        simulation.environment.run(until=2_000_000_000)
+    assert told == [("red", "2 red"), ("green", "4 green"), ("red", "5 red"), ("green", "6 none")]
+
+
 def test_a_robot_that_comes_when_the_last_one_stood_at_the_light_drives() -> None:
     with as_file(files("reconros_zenoh.applications.driving")) as folder:
         project = load_project(folder)
