@@ -19,17 +19,17 @@ class Chain:
         self._clock_ns = clock_ns
         self._reached_ns: dict[str, list[int]] = {}
 
-    def note(self, station: str, number: str) -> None:
-        """Note that a station has the picture of this number, if the first one had it, too."""
+    def note(self, station: str, name: str) -> None:
+        """Note that a station has the picture of this name, if the first one had it, too."""
         if station == STATIONS[0]:
-            self._reached_ns[number] = []
-        if number in self._reached_ns:
-            self._reached_ns[number].append(self._clock_ns())
+            self._reached_ns[name] = []
+        if name in self._reached_ns:
+            self._reached_ns[name].append(self._clock_ns())
 
     def sections_ns(self) -> dict[str, list[int]]:
-        """Return the times [ns] from station to station of each picture that came through, by its number."""
+        """Return the times [ns] from station to station of each picture that came through, by its name."""
         return {
-            number: [there - here for here, there in pairwise(reached)]
-            for number, reached in self._reached_ns.items()
+            name: [there - here for here, there in pairwise(reached)]
+            for name, reached in self._reached_ns.items()
             if len(reached) == len(STATIONS)
         }

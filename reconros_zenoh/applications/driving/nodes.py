@@ -1,7 +1,7 @@
 """The nodes of Mapping and Optimizing Communication, Section 6, as callbacks.
 
-None knows how its topics are mapped. The header of a picture, with its number as frame_id, goes with all that
-is made of it.
+None knows how its topics are mapped. The header of a picture, with its name as frame_id, goes with all that is
+made of it.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     Picture = NDArray[np.uint8]
     Steps = Generator[Awaitable, object, None]
     Note = Callable[[str, str], None]
-    """Hears that a station of the chain has the picture of this number."""
+    """Hears that a station of the chain has the picture of this name."""
 
 _WATCH = 1
 
