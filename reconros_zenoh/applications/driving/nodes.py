@@ -1,7 +1,7 @@
 """The nodes of Mapping and Optimizing Communication, Section 6, as callbacks.
 
-None knows how its topics are mapped. The header of a picture, with its name as frame_id, goes with all that is
-made of it.
+None knows how its topics are mapped. The header of a picture, with its name as frame_id, goes with all that
+is made of it.
 """
 
 from __future__ import annotations
