@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
@@ -128,7 +128,6 @@ def test_sobel_equals_its_definition_on_extreme_images(image):
     assert np.array_equal(sobel(image), sobel_reference(image))
 
 
-@settings(deadline=None)
 @given(st.integers(0, 2**32 - 1))
 def test_sobel_equals_its_definition_on_random_images(seed):
     image = np.random.default_rng(seed).integers(256, size=(480, 640, 3), dtype=np.uint8)

@@ -58,7 +58,7 @@ def test_what_is_unmapped_is_gone_and_not_soon_used_again() -> None:
         space.read(address, 1)
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(st.lists(st.tuples(st.integers(0, 20_000), st.booleans()), max_size=40))
 def test_blocks_never_touch(steps: list[tuple[int, bool]]) -> None:
     space = AddressSpace()
@@ -112,7 +112,7 @@ string[2] two
 
 
 @pytest.mark.parametrize("pointer_bytes", [4, 8])
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(data=st.data())
 def test_a_message_comes_out_as_it_went_in(pointer_bytes: int, data: st.DataObject) -> None:
     registry = types()

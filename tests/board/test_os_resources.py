@@ -78,7 +78,7 @@ def test_a_full_mailbox_blocks_and_try_does_not() -> None:
     assert [mailbox.try_get() for _ in range(3)] == [2, 4, None]
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     size=st.integers(1, 3),
     steps=st.lists(st.sampled_from(["put", "get", "try put", "try get", "run"]), max_size=40),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from reconros_zenoh.clock.virtual import VirtualEnvironment, succeed_once
@@ -22,7 +22,6 @@ def test_time_starts_where_it_is_told_and_jumps_to_the_next_event() -> None:
     assert environment.now == environment.clock_ns() == 5 + HOUR_NS
 
 
-@settings(deadline=None, derandomize=True)
 @given(st.lists(st.integers(0, 10**15) | st.integers(0, 3)))
 def test_calls_happen_at_their_integer_times_and_those_of_one_time_in_the_order_made(
     delays: list[int],

@@ -53,7 +53,7 @@ def test_time_starts_at_the_monotonic_clock() -> None:
     assert type(environment.now) is int
 
 
-@settings(deadline=None, derandomize=True, max_examples=30)
+@settings(max_examples=30)
 @given(st.lists(st.integers(0, 300_000), min_size=1, max_size=8))
 def test_events_happen_in_the_order_of_their_times_and_none_before_its_time(delays: list[int]) -> None:
     environment = WallEnvironment()

@@ -155,7 +155,7 @@ class StandardMachine(ExecutorMachine):
         self.workers.append(Worker(SOFTWARE))
 
 
-effort = settings(deadline=None, derandomize=True, max_examples=80, stateful_step_count=80)
+effort = settings(max_examples=80, stateful_step_count=80)
 TestReconrosExecutor = ReconrosMachine.TestCase
 TestReconrosExecutor.settings = effort
 TestStandardExecutor = StandardMachine.TestCase

@@ -30,7 +30,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 from callbacks_for_tests import AlwaysReady, EventQueue, always_ready, arrive, callback, serve_many
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from reconros_zenoh.executor.callbacks import CallbackEntry, CallbackKind
@@ -132,7 +132,6 @@ seeds = st.integers(0, 2**32)
 crews = st.lists(st.integers(SOFTWARE, 2), min_size=1, max_size=5)
 
 
-@settings(deadline=None, derandomize=True)
 @given(entries(masks), kinds, masks, places, crews, seeds)
 def test_each_reconros_worker_serves_a_callback_that_is_always_ready_within_the_bound(
     others: list[CallbackEntry],
@@ -152,7 +151,6 @@ def test_each_reconros_worker_serves_a_callback_that_is_always_ready_within_the_
             assert worker.resource not in bounds or worker.passed < bounds[worker.resource]
 
 
-@settings(deadline=None, derandomize=True)
 @given(entries(st.just([SOFTWARE])), kinds, places, st.integers(1, 4), seeds)
 def test_standard_workers_serve_a_callback_that_is_always_ready_within_the_bound(
     others: list[CallbackEntry], kind: CallbackKind, place: int, workers: int, seed: int

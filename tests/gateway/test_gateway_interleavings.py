@@ -247,6 +247,6 @@ class Sharing(RuleBasedStateMachine):
 
 
 Sharing.TestCase.settings = settings(
-    max_examples=80, stateful_step_count=60, deadline=None, suppress_health_check=list(HealthCheck)
+    max_examples=80, stateful_step_count=60, suppress_health_check=list(HealthCheck)
 )
 TestSharing = Sharing.TestCase

@@ -107,7 +107,7 @@ def test_the_svg_shows_what_the_issue_asks_for(tmp_path: Path) -> None:
     assert len(re.findall(r"stroke: #c2485a; stroke-width: 2", text)) == 2 * 3 + 1
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(graph=graphs(max_topics=3))
 def test_every_graph_can_be_drawn(tmp_path_factory: pytest.TempPathFactory, graph: ComputationGraph) -> None:
     path = tmp_path_factory.mktemp("drawn") / "graph.svg"

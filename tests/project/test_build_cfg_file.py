@@ -401,7 +401,7 @@ def test_a_byte_order_mark_and_other_line_ends(tmp_path: Path) -> None:
     assert read_build_cfg(path).name == "x"
 
 
-@settings(deadline=None, derandomize=True, max_examples=50)
+@settings(max_examples=50)
 @given(
     first=st.integers(0, 20),
     length=st.integers(1, 20),
@@ -433,7 +433,7 @@ def test_ranges_expand_the_same_way_everywhere(
     assert by_pick.slots == tuple(dict.fromkeys(first_id + n - first for n in picked))
 
 
-@settings(deadline=None, derandomize=True, max_examples=200)
+@settings(max_examples=200)
 @given(st.text(alphabet='[]@()=:*,%"# \tHwSlotRegionId01\n', max_size=200))
 def test_any_text_reads_or_is_a_file_error(tmp_path_factory: pytest.TempPathFactory, text: str) -> None:
     folder = tmp_path_factory.getbasetemp()

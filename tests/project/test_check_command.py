@@ -180,7 +180,7 @@ pieces = st.sampled_from(
 edits = st.tuples(st.integers(0, len(GOOD)), st.integers(0, 40), pieces)
 
 
-@settings(deadline=None, derandomize=True, max_examples=300)
+@settings(max_examples=300)
 @given(st.lists(edits, min_size=1, max_size=8))
 @example([(0, len(GOOD), b"")])
 def test_a_damaged_file_reads_or_is_a_file_error(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from reconros_zenoh.project.ini import Option
@@ -76,7 +76,6 @@ def test_no_regions() -> None:
     assert slot_resources(()) == SlotResources(0, 0, 0, 0)
 
 
-@settings(deadline=None, derandomize=True)
 @given(x=numbers, y=numbers, width=sizes, height=sizes, colon=st.sampled_from([":", "", " : "]))
 def test_a_region_counts_its_sites(x: int, y: int, width: int, height: int, colon: str) -> None:
     [region] = read(f"SLICE_X{x}Y{y}{colon}SLICE_X{x + width - 1}Y{y + height - 1}")
@@ -94,7 +93,6 @@ rectangles = st.builds(
 )
 
 
-@settings(deadline=None, derandomize=True)
 @given(rectangles, rectangles)
 def test_regions_overlap_if_they_share_a_site(one: Region, other: Region) -> None:
     assert one.overlaps(other) == bool(sites_of([one]) & sites_of([other]))

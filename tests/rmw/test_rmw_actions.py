@@ -221,7 +221,7 @@ def test_old_results_are_forgotten() -> None:
     assert len(case.server._goals) == len(case.server._entries) == len(case.server._results) == 100
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     st.lists(
         st.tuples(st.sampled_from(["send", "execute", "cancel", "finish"]), st.integers(0, 5)), max_size=25

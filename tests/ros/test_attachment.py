@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from zenoh.ext import Int64, z_serialize
 
@@ -20,7 +20,6 @@ def test_golden_bytes() -> None:
     assert data.hex() == "0100000000000000" + "0807060504030201" + "10" + GID.hex()
 
 
-@settings(deadline=None, derandomize=True)
 @given(int64, int64, gids)
 def test_round_trip_in_the_bytes_that_zenoh_gives(sequence: int, timestamp: int, gid: bytes) -> None:
     attachment = Attachment(sequence, timestamp, gid)

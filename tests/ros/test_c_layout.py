@@ -76,7 +76,7 @@ def test_all_standard_messages_are_laid_out_as_by_the_compiler() -> None:
 FIELD_TYPES = ("bool", "uint8", "int16", "uint32", "float64", "string", "uint8[]", "float64[3]", "string[2]")
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.lists(st.sampled_from(FIELD_TYPES), min_size=1, max_size=8))
 def test_any_order_of_fields_is_laid_out_as_by_the_compiler(forms: list[str]) -> None:
     registry = TypeRegistry()

@@ -65,7 +65,7 @@ STRING = REGISTRY.message("std_msgs/String")
 IMAGE = REGISTRY.message("sensor_msgs/Image")
 HELLO = bytes.fromhex("000100000800000068656c6c6f203000")
 
-properties = settings(deadline=None, derandomize=True, max_examples=150)
+properties = settings(max_examples=150)
 
 
 def arrays(base: str, least: int, most: int) -> st.SearchStrategy[np.ndarray[Any, Any]]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import string
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from reconros_zenoh.ros.graph import EndpointKind, EndpointToken, NodeToken, gid, parse, tokens_expression
@@ -96,7 +96,6 @@ def test_tokens_of_other_releases() -> None:
     assert humble.type_hash == "TypeHashNotSupported"
 
 
-@settings(deadline=None, derandomize=True)
 @given(nodes | endpoints)
 def test_round_trip(token: NodeToken | EndpointToken) -> None:
     assert parse(token.format()) == token
@@ -133,7 +132,6 @@ def test_what_is_no_token(key: str) -> None:
 pieces = st.sampled_from(STRING_PUBLISHER.split("/")) | st.text(max_size=4)
 
 
-@settings(deadline=None, derandomize=True)
 @given(st.text() | st.lists(pieces, max_size=15).map("/".join))
 def test_no_key_makes_parse_raise(key: str) -> None:
     token = parse(key)

@@ -6,7 +6,7 @@ import re
 import string
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from reconros_zenoh.errors import UsageError
@@ -58,7 +58,6 @@ def test_the_empty_enclave_is_mangled_as_the_root() -> None:
     assert mangle("") == "%"
 
 
-@settings(deadline=None, derandomize=True)
 @given(st.text(alphabet=string.ascii_letters + string.digits + "_/", min_size=1))
 def test_mangled_names_come_back_and_are_one_part_of_a_key(name: str) -> None:
     assert "/" not in mangle(name)

@@ -14,7 +14,7 @@ import pyzeros.pub
 import pyzeros.qos
 import pyzeros.service_common
 import pyzeros.utils
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from ros2_pyterfaces.cyclone.geometry_msgs import msg as geometry_msgs
 from ros2_pyterfaces.cyclone.nav_msgs import msg as nav_msgs
@@ -37,7 +37,6 @@ IDS: dict[str, Any] = {
 }
 DDS_STRING = "std_msgs::msg::dds_::String_"
 STRING_HASH = REGISTRY.message("std_msgs/String").type_hash
-properties = settings(deadline=None, derandomize=True)
 
 QOS = [
     (QosProfile(), pyzeros.qos.QosProfile()),
@@ -140,7 +139,6 @@ def test_name_resolution(name: str, namespace: str) -> None:
     assert resolve(name, namespace, "node") == theirs
 
 
-@properties
 @given(st.text())
 def test_gid_of_any_text(text: str) -> None:
     assert gid(text) == pyzeros.utils.rmw_zenoh_gid(text)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from reconros_zenoh.errors import UsageError
@@ -88,7 +88,6 @@ def test_fields_that_are_spelled_out_may_be_defaults() -> None:
     assert QosProfile.decode("1:2:1,42:9223372036,854775807:,:1,,") == QosProfile(depth=42)
 
 
-@settings(deadline=None, derandomize=True)
 @given(profiles)
 def test_round_trip(profile: QosProfile) -> None:
     assert QosProfile.decode(profile.encode()) == profile
@@ -119,7 +118,6 @@ def test_nonsense_is_refused(text: str, reason: str) -> None:
         QosProfile.decode(text)
 
 
-@settings(deadline=None, derandomize=True)
 @given(st.text(alphabet=":,0129x-", max_size=20))
 def test_any_text_gives_a_profile_or_a_value_error(text: str) -> None:
     try:

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from reconros_zenoh.transport.frames import Frames
@@ -65,7 +65,6 @@ part = st.builds(
 )
 
 
-@settings(deadline=None)
 @given(st.lists(part, max_size=4))
 def test_the_content_is_that_of_the_parts(parts: list[bytes]) -> None:
     joined = Frames(SharedMemory(64 * MIB).open_pool).join(parts)

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 import zenoh
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from reconros_zenoh.errors import TransportError
@@ -14,13 +14,11 @@ expressions = st.lists(st.sampled_from(CHUNKS), min_size=1, max_size=5).map(
 )
 
 
-@settings(deadline=None)
 @given(expressions, expressions)
 def test_intersects_as_zenoh_does(left: str, right: str) -> None:
     assert intersects(left, right) == zenoh.KeyExpr(left).intersects(zenoh.KeyExpr(right))
 
 
-@settings(deadline=None)
 @given(st.text("ab*$/@?#", max_size=8))
 def test_accepts_what_zenoh_accepts(text: str) -> None:
     try:
