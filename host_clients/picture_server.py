@@ -32,13 +32,12 @@ class PictureServer:
     """
 
     def __init__(self, port: int, title: str) -> None:
-        self._page = _PAGE.format(title=title).encode()
         self._changed = threading.Condition()
         self._jpeg = b""
         self._number = 0
         self._closed = False
         try:
-            self._server = ThreadingHTTPServer(("127.0.0.1", port), self._handler())
+            self._server = ThreadingHTTPServer(("127.0.0.1", port), self._handler(title))
         except OSError as error:
             raise UsageError(
                 f"port {port} cannot be used for the pictures ({error.strerror}). Give another one."
@@ -78,8 +77,8 @@ class PictureServer:
                 self._changed.wait(_LOOK_S)
             return None if self._closed else (self._number, self._jpeg)
 
-    def _handler(self) -> type[BaseHTTPRequestHandler]:
-        page = self._page
+    def _handler(self, title: str) -> type[BaseHTTPRequestHandler]:
+        page = _PAGE.format(title=title).encode()
 
         class Handler(BaseHTTPRequestHandler):
             pictures = self

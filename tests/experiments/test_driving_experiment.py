@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import math
+from contextlib import contextmanager
 from functools import cache
 from importlib.resources import as_file, files
 from typing import TYPE_CHECKING, Any
@@ -41,12 +42,25 @@ from reconros_zenoh.project.loader import load_project, read_project
 from reconros_zenoh.ros.types import TypeRegistry
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
     from pathlib import Path
+
+    from board_daemon.hosting import HostedBoard
 
 PICTURES = 70
 PROFILE = read_profile("zcu104")
 IMAGE_BYTES = 640 * 480 * 3
 PIXEL_PER_CYCLE_MS = 640 * 480 / 100_000
+
+
+@contextmanager
+def board() -> Iterator[tuple[Simulation, HostedBoard, TypeRegistry]]:
+    """Begin a simulation with the example as it ships, every topic in memory."""
+    with as_file(files("reconros_zenoh.applications.driving")) as folder:
+        project = load_project(folder)
+    with Simulation(project.types()) as simulation:
+        hosted = simulation.add_board(PROFILE, project, project.mapping(None), BoardOptions())
+        yield simulation, hosted, project.types()
 
 
 @cache
@@ -100,12 +114,9 @@ def test_the_robot_stands_while_the_light_is_red_and_keeps_its_lane(variant: str
 
 def test_the_map_finds_in_each_picture_what_was_in_the_one_before() -> None:
     matches: list[int] = []
-    with as_file(files("reconros_zenoh.applications.driving")) as folder:
-        project = load_project(folder)
-    with Simulation(project.types()) as simulation:
-        simulation.add_board(PROFILE, project, project.mapping(None), BoardOptions())
+    with board() as (simulation, _, types):
         simulation.context().node("desktop").subscription(
-            project.types().message("std_msgs/msg/UInt32"),
+            types.message("std_msgs/msg/UInt32"),
             "/matches",
             lambda received: matches.append(received.message.data),
         )
@@ -221,11 +232,7 @@ def test_the_drawing_marks_the_paper_and_shows_the_last_drive() -> None:
 
 def test_no_message_that_the_nodes_cannot_use_comes_to_them() -> None:
     """Neither a grey picture where a coloured one is wanted nor a lane without numbers; then it goes on."""
-    with as_file(files("reconros_zenoh.applications.driving")) as folder:
-        project = load_project(folder)
-    types = project.types()
-    with Simulation(types) as simulation:
-        hosted = simulation.add_board(PROFILE, project, project.mapping(None), BoardOptions())
+    with board() as (simulation, hosted, types):
         foreign = simulation.context().node("foreign")
         grey = image_message(types, "mono8", np.zeros((480, 640), np.uint8))
         coloured = image_message(types, "bgr8", np.zeros((480, 640, 3), np.uint8))
@@ -251,12 +258,8 @@ def test_no_message_that_the_nodes_cannot_use_comes_to_them() -> None:
 
 def test_a_node_that_nobody_observes_takes_pictures_of_others() -> None:
     """One whose name no other station had, as of a node that was replaced by one elsewhere."""
-    with as_file(files("reconros_zenoh.applications.driving")) as folder:
-        project = load_project(folder)
-    types = project.types()
     heard: list[str] = []
-    with Simulation(types) as simulation:
-        hosted = simulation.add_board(PROFILE, project, project.mapping(None), BoardOptions())
+    with board() as (simulation, hosted, types):
         foreign = simulation.context().node("foreign")
         picture = image_message(types, "bgr8", World().picture(Robot(), 0.0, 0))
         picture.header.frame_id = "foreign"
@@ -273,13 +276,9 @@ def test_a_node_that_nobody_observes_takes_pictures_of_others() -> None:
 
 
 def test_each_detection_tells_once_and_watches_again_when_the_other_has_told() -> None:
-    with as_file(files("reconros_zenoh.applications.driving")) as folder:
-        project = load_project(folder)
-    types = project.types()
     told: list[tuple[str, str]] = []
     seen = {"none": (Robot(), 0.0), "red": (Robot.after(1.2), 0.0), "green": (Robot.after(1.2), RED_S)}
-    with Simulation(types) as simulation:
-        simulation.add_board(PROFILE, project, project.mapping(None), BoardOptions())
+    with board() as (simulation, _, types):
         foreign = simulation.context().node("foreign")
         publisher = foreign.publisher(types.message("sensor_msgs/msg/Image"), "/image")
         for colour in ("red", "green"):
@@ -297,10 +296,7 @@ def test_each_detection_tells_once_and_watches_again_when_the_other_has_told() -
 
 
 def test_a_robot_that_comes_when_the_last_one_stood_at_the_light_drives() -> None:
-    with as_file(files("reconros_zenoh.applications.driving")) as folder:
-        project = load_project(folder)
-    with Simulation(project.types()) as simulation:
-        simulation.add_board(PROFILE, project, project.mapping(None), BoardOptions())
+    with board() as (simulation, *_):
         first = simulation.add_robot(RobotOptions("", 30), lambda _: None)
         simulation.run()
         second = simulation.add_robot(RobotOptions("", 30), lambda _: None)
