@@ -43,6 +43,11 @@ class GoalStatus(IntEnum):
         """Whether nothing more happens to the goal."""
         return self >= GoalStatus.SUCCEEDED
 
+    @property
+    def cancelable(self) -> bool:
+        """Whether a request to cancel the goal changes anything, as in the state machine of rcl_action."""
+        return self in {GoalStatus.ACCEPTED, GoalStatus.EXECUTING}
+
 
 class GoalHandle:
     """An accepted goal; its methods may be called from any thread.
@@ -181,7 +186,7 @@ class ActionServer:
         response = zero_message(self._type.cancel_goal.response)
         with self._lock:
             meant = [handle for handle in self._goals.values() if _is_meant(handle, goal_id, stamp_ns)]
-            going = [handle for handle in meant if not handle.status.ended]
+            going = [handle for handle in meant if handle.status.cancelable]
             for handle in going:
                 handle.status = GoalStatus.CANCELING
             response.goals_canceling = [

@@ -123,7 +123,8 @@ class QosProfile:
     def decode(cls, text: str) -> Self:
         """Return the profile that `text`, the QoS part of an endpoint token, stands for.
 
-        Raises ValueError when a part is missing, is no number, or names no policy.
+        What the endpoint leaves to the system, or to whom it meets (rmw_zenoh does not settle that), is the
+        default. Raises ValueError when a part is missing, is no number, or names no policy.
         """
         parts = text.split(":")
         if [part.count(",") for part in parts] != [0, 0, 1, 1, 1, 2]:
@@ -149,6 +150,13 @@ _POLICIES: Mapping[str, type[IntEnum]] = {
     "history": History,
 }
 _RMW_DEFAULT = QosProfile(depth=42)
+# SYSTEM_DEFAULT and BEST_AVAILABLE of each policy
+_LEFT_OPEN: Mapping[type[IntEnum], tuple[str, ...]] = {
+    Reliability: ("0", "4"),
+    Durability: ("0", "4"),
+    History: ("0",),
+    Liveliness: ("0", "5"),
+}
 
 _Policy = TypeVar("_Policy", Reliability, Durability, History, Liveliness)
 
@@ -176,7 +184,7 @@ def _policy(field: str, default: _Policy, text: str) -> _Policy:
     for policy in kind:
         if field == str(policy.value):
             return policy
-    if not field:
+    if not field or field in _LEFT_OPEN[kind]:
         return default
     known = ", ".join(f"{policy.value} ({policy.name})" for policy in kind)
     raise ValueError(f"QoS {text!r}: {field!r} is no {kind.__name__.lower()}, which is one of {known}")

@@ -142,8 +142,10 @@ def test_who_is_meant_by_a_request_to_cancel() -> None:
         ids.append(case.send())
     assert cancel_code(case, bytes(16), 2 * 10**9) == (0, 2)  # all that were accepted until then
     assert cancel_code(case, ids[3], 1) == (0, 1)  # that one, and all that are older
+    assert cancel_code(case, ids[3]) == (3, 0)  # it is being canceled already
     assert [goal.is_cancel_requested for goal in case.goals] == [True, True, False, True]
-    assert cancel_code(case, bytes(16)) == (0, 4)  # all
+    assert cancel_code(case, bytes(16)) == (0, 1)  # all, and only one is not being canceled yet
+    assert cancel_code(case, bytes(16)) == (0, 0)
     assert cancel_code(case, bytes(15) + b"x") == (2, 0)
     case.finish(case.goals[0])
     assert cancel_code(case, ids[0]) == (3, 0)
@@ -157,7 +159,8 @@ def test_a_time_to_cancel_counts_to_the_nanosecond_and_from_the_start_of_the_clo
         ids.append(case.send())
     assert cancel_code(case, ids[2]) == (0, 1)  # no time is given: that one alone
     assert cancel_code(case, bytes(16), 2 * 10**9 + 4) == (0, 1)
-    assert cancel_code(case, ids[2], 2 * 10**9 + 5) == (0, 3)
+    assert cancel_code(case, bytes(16), 2 * 10**9 + 5) == (0, 1)
+    assert [goal.is_cancel_requested for goal in case.goals] == [True, True, True]
 
 
 def test_an_aborted_goal_and_one_that_failed() -> None:

@@ -88,6 +88,12 @@ def test_fields_that_are_spelled_out_may_be_defaults() -> None:
     assert QosProfile.decode("1:2:1,42:9223372036,854775807:,:1,,") == QosProfile(depth=42)
 
 
+def test_what_an_endpoint_leaves_open_is_the_default() -> None:
+    """Best available, as rmw_zenoh writes it, and the defaults of the system."""
+    assert QosProfile.decode("4:4:,10:,854775806:,:5,,854775806").words() == QosProfile().words()
+    assert QosProfile.decode("0:0:0,10:,:,:0,,") == QosProfile()
+
+
 @given(profiles)
 def test_round_trip(profile: QosProfile) -> None:
     assert QosProfile.decode(profile.encode()) == profile
@@ -102,7 +108,7 @@ def test_round_trip(profile: QosProfile) -> None:
         ("::10:,:,:,,", "not of the form"),
         ("3::,10:,:,:,,", "'3' is no reliability"),
         (":x:,10:,:,:,,", "'x' is no durability"),
-        ("::0,10:,:,:,,", "'0' is no history"),
+        ("::3,10:,:,:,,", "'3' is no history"),
         ("::,10:,:,:7,,", "'7' is no liveliness"),
         ("::,ten:,:,:,,", "'ten' is not a number"),
         ("::,-1:,:,:,,", "'-1' is not a number"),
