@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import time
-from contextlib import suppress
+from collections import deque
 from functools import partial
 from graphlib import TopologicalSorter
-from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING, Self
 
 from deploy.child import local_environment
 from deploy.compose import Condition
 from deploy.service_run import ServiceRun, ServiceState
 from deploy.signals import EndingSignals
+from reconros_zenoh.clock.alarm import Alarm
 from reconros_zenoh.errors import ExperimentError, FileError, UsageError
 
 if TYPE_CHECKING:
@@ -53,10 +53,10 @@ class LocalRunner:
         self._log_folder = log_folder
         self._on_event = on_event
         self._stop_limit_ns = round(stop_limit_s * 10**9)
-        # Whatever happens is a call, put here by a thread that waits for a child or by a signal handler:
-        # `put` of SimpleQueue may be interrupted by another `put`, that of Queue may not.
-        self._events: SimpleQueue[Callable[[], None]] = SimpleQueue()
-        self._signals = EndingSignals(wake=lambda: self._events.put(lambda: None))
+        # Whatever happens is a call, put here by a thread that waits for a child; a signal only rings.
+        self._events: deque[Callable[[], None]] = deque()
+        self._alarm = Alarm()
+        self._signals = EndingSignals(wake=self._alarm.ring)
         own_environment = local_environment(environment)
         services = deployment.services
         order = TopologicalSorter({name: service.depends_on for name, service in services.items()})
@@ -65,7 +65,7 @@ class LocalRunner:
                 services[name],
                 log_folder / f"{name}.log",
                 own_environment,
-                self._events.put,
+                self._put,
                 partial(self._tell, name),
             )
             for name in order.static_order()
@@ -175,13 +175,18 @@ class LocalRunner:
         return None
 
     def _wait(self) -> None:
-        """Wait for one event or for the next thing that is due, and deal with it."""
+        """Wait for an event or for the next thing that is due, and deal with it."""
         now_ns = time.monotonic_ns()
         due_s = [(run.next_ns - now_ns) / 10**9 for run in self._runs.values() if run.next_ns is not None]
-        with suppress(Empty):
-            self._events.get(timeout=max(0, min([_LONGEST_WAIT_S, *due_s])))()
+        self._alarm.wait(max(0, min([_LONGEST_WAIT_S, *due_s])))
+        while self._events:
+            self._events.popleft()()
         for run in self._runs.values():
             run.act(time.monotonic_ns())
+
+    def _put(self, event: Callable[[], None]) -> None:
+        self._events.append(event)
+        self._alarm.ring()
 
     def _stop(self) -> None:
         while True:

@@ -10,11 +10,11 @@ import threading
 import time
 from collections import deque
 from dataclasses import dataclass
-from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
+from reconros_zenoh.clock.alarm import Alarm
 from reconros_zenoh.clock.virtual import VirtualEnvironment, succeed_once
 
 if TYPE_CHECKING:
@@ -63,7 +63,7 @@ class WallEnvironment(VirtualEnvironment):
         self._inbox: deque[tuple[int, Callable[..., object], tuple[object, ...]]] = deque()
         self._turn = threading.Lock()
         self._turn.acquire()
-        self._alarm: SimpleQueue[None] = SimpleQueue()
+        self._alarm = Alarm()
         self._asleep_until: float = -1
         self._lead_ns: float = _FIRST_LEAD_NS
         self._failure: BaseException | None = None
@@ -87,7 +87,7 @@ class WallEnvironment(VirtualEnvironment):
                 self._turn.release()
             if next_due < self._asleep_until:
                 self._asleep_until = -1
-                self._alarm.put(None)
+                self._alarm.ring()
                 return
 
     def run(self, until: simpy.Event) -> Any:  # type: ignore[override] # only until an event
@@ -97,7 +97,7 @@ class WallEnvironment(VirtualEnvironment):
         """
         if until.callbacks is not None:
             # It may happen in another thread's turn.
-            until.callbacks.append(lambda _: self._alarm.put(None))
+            until.callbacks.append(lambda _: self._alarm.ring())
         self._turn.release()
         try:
             while not until.processed:
@@ -164,13 +164,10 @@ class WallEnvironment(VirtualEnvironment):
             if self._failure is not None or self.peek() < until_ns:
                 return
             nap_ns = early_ns - lead_ns
-            try:
-                self._alarm.get(timeout=min(nap_ns, _NAP_NS) / 1e9)
-            except Empty:
-                if nap_ns <= _NAP_NS:
-                    self._learn_lead(time.monotonic_ns() > until_ns)
-                continue
-            return
+            if self._alarm.wait(min(nap_ns, _NAP_NS) / 1e9):
+                return
+            if nap_ns <= _NAP_NS:
+                self._learn_lead(time.monotonic_ns() > until_ns)
 
     def _learn_lead(self, is_late: bool) -> None:
         """Adjust how long before an event a sleep is to end."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from contextlib import closing, suppress
-from queue import Empty, SimpleQueue
+from queue import Empty, Queue
 from time import monotonic
 from typing import TYPE_CHECKING
 
@@ -54,7 +54,7 @@ class TokenChanges:
 
 def gather(watch_tokens: Callable[[Callable[[str, bool], None]], Declaration], timeout_ns: int) -> list[str]:
     """Return the tokens that are alive: what `watch_tokens` reports until nothing came for 100 ms."""
-    changes: SimpleQueue[tuple[str, bool]] = SimpleQueue()
+    changes: Queue[tuple[str, bool]] = Queue()  # SimpleQueue may not hear that time is up, see `Alarm`
     alive: set[str] = set()
     end = monotonic() + timeout_ns / 1e9
     watch = watch_tokens(lambda token, is_alive: changes.put((token, is_alive)))

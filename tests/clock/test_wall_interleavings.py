@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import sys
 from functools import partial
-from queue import Empty, SimpleQueue
 from threading import Thread
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -16,6 +15,7 @@ import pytest
 from made_up_time import MS, MadeUpTime
 from watched_loop import LIMIT_S, join, start_loop, watch
 
+from reconros_zenoh.clock.alarm import Alarm
 from reconros_zenoh.clock.wall import WallEnvironment
 
 if TYPE_CHECKING:
@@ -81,7 +81,7 @@ class Intruder:
             sys.settrace(before)
 
 
-class Sleep(SimpleQueue[None]):
+class Sleep(Alarm):
     """The loop's sleep. The intruder ends it, or a time that is near; else it would be for good."""
 
     def __init__(self, made_up: MadeUpTime, intruder: Intruder) -> None:
@@ -89,15 +89,15 @@ class Sleep(SimpleQueue[None]):
         self._time = made_up
         self._intruder = intruder
 
-    def get(self, block: bool = True, timeout: float | None = None) -> None:
-        if self.empty():
-            self._intruder.post()
-        if self.empty():
-            assert timeout is not None, "the loop sleeps for good"
-            assert timeout < 1, "the loop oversleeps"
-            self._time.now_ns += round(timeout * 1e9)
-            raise Empty
-        super().get()
+    def wait(self, timeout_s: float) -> bool:
+        if super().wait(0):
+            return True
+        self._intruder.post()
+        if super().wait(0):
+            return True
+        assert timeout_s < 1, "the loop oversleeps"
+        self._time.now_ns += round(timeout_s * 1e9)
+        return False
 
 
 def run_loop(made_up: MadeUpTime, moment: int, way: Way, post: Post, ahead_ns: int | None) -> bool:

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import astuple
-from queue import Empty, SimpleQueue
 
 import pytest
 from made_up_time import MS, US, MadeUpTime
 
 from reconros_zenoh.clock import wall
+from reconros_zenoh.clock.alarm import Alarm
 from reconros_zenoh.clock.wall import Lag, WallEnvironment
 
 
-class Sleep(SimpleQueue[None]):
+class Sleep(Alarm):
     """A sleep that nothing ends early, but the first is off by some time, or all are."""
 
     def __init__(self, made_up: MadeUpTime, off_ns: int, *, always: bool = False) -> None:
@@ -22,14 +22,13 @@ class Sleep(SimpleQueue[None]):
         self._always = always
         self.lengths_ns: list[int] = []
 
-    def get(self, block: bool = True, timeout: float | None = None) -> None:
-        assert timeout is not None
-        length_ns = round(timeout * 1e9)
+    def wait(self, timeout_s: float) -> bool:
+        length_ns = round(timeout_s * 1e9)
         self.lengths_ns.append(length_ns)
         self._time.now_ns += length_ns + self._off_ns
         if not self._always:
             self._off_ns = 0
-        raise Empty
+        return False
 
 
 def run_late(environment: WallEnvironment, *delays_ns: int) -> None:

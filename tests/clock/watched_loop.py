@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from queue import SimpleQueue
 from threading import Event, Thread
 from typing import TYPE_CHECKING
+
+from reconros_zenoh.clock.alarm import Alarm
 
 if TYPE_CHECKING:
     import simpy
@@ -15,16 +16,16 @@ LIMIT_S = 30
 """Long after everything here is over; only a test that fails waits that long."""
 
 
-class _WatchedAlarm(SimpleQueue[None]):
+class _WatchedAlarm(Alarm):
     """Says when the loop goes to sleep on it."""
 
     def __init__(self) -> None:
         super().__init__()
         self.sleeps = Event()
 
-    def get(self, block: bool = True, timeout: float | None = None) -> None:
+    def wait(self, timeout_s: float) -> bool:
         self.sleeps.set()
-        super().get(block, timeout)
+        return super().wait(timeout_s)
 
 
 def watch(environment: WallEnvironment) -> Event:
