@@ -74,7 +74,7 @@ def compare(
     ),
     as_json: AsJson = False,
 ) -> None:
-    """Run a project under its mappings in virtual time and compare them.
+    """Compare the mappings of a project in virtual time.
 
     Shows how many messages left the board on each topic, how old they were, what was lost and what limits.
     """
