@@ -39,7 +39,11 @@ class _Slot(_Part):
 
 
 class _Publisher(_Part):
+    sent: int
     dropped: int
+    age_p50_ms: float | None
+    age_p95_ms: float | None
+    age_max_ms: float | None
 
 
 class _Stream(_Part):

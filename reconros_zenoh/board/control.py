@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import logging
-from collections import Counter
+from collections import defaultdict
 from contextlib import closing
 from queue import SimpleQueue
 from threading import Event
 from typing import TYPE_CHECKING, Any
 
 import msgpack
+import numpy as np
 from pydantic import ValidationError
 
 from reconros_zenoh.board.answers import VERSION, StatusAnswer
@@ -31,6 +32,7 @@ _log = logging.getLogger(__name__)
 _HOST_ANEW = b"host anew"
 _ANSWER_NS = 2_000_000_000
 _LONGEST_ANSWER = 10_000_000
+_AGES = {"age_p50_ms": 50, "age_p95_ms": 95, "age_max_ms": 100}
 
 
 def alive_key(board: str) -> str:
@@ -118,7 +120,7 @@ def status(board: Board, executor: Executor) -> dict[str, Any]:
             }
             for slot in board.slots.values()
         ],
-        "publishers": _dropped(board.writers),
+        "publishers": _publishers(board.writers),
         "gateways": gateways(board),
         "hmt": {
             topic.key: {"passed": topic.passed, "dropped": topic.dropped, "waits": topic.waits}
@@ -135,11 +137,24 @@ def status(board: Board, executor: Executor) -> dict[str, Any]:
     }
 
 
-def _dropped(writers: Iterable[TopicWriter]) -> dict[str, dict[str, int]]:
-    topics: Counter[str] = Counter()
+def _publishers(writers: Iterable[TopicWriter]) -> dict[str, dict[str, float | None]]:
+    """Return by topic what left the board and what did not; ages are those of the last messages [ms]."""
+    topics: defaultdict[str, list[TopicWriter]] = defaultdict(list)
     for writer in writers:
-        topics[writer.topic] += writer.dropped
-    return {topic: {"dropped": dropped} for topic, dropped in topics.items()}
+        topics[writer.topic].append(writer)
+    told: dict[str, dict[str, float | None]] = {}
+    for topic, of_topic in topics.items():
+        ages_ms = np.concatenate([np.array(writer.ages_ns, np.float64) for writer in of_topic]) / 1e6
+        told[topic] = {
+            "sent": sum(writer.sent for writer in of_topic),
+            "dropped": sum(writer.dropped for writer in of_topic),
+            **dict.fromkeys(_AGES),
+        }
+        if ages_ms.size:
+            told[topic] |= dict(
+                zip(_AGES, np.percentile(ages_ms, list(_AGES.values())).tolist(), strict=True)
+            )
+    return told
 
 
 def gateways(board: Board) -> list[dict[str, Any]]:

@@ -12,7 +12,7 @@ from reconros_zenoh.errors import BadMessageError, UsageError
 from reconros_zenoh.ros.qos import QosProfile, Reliability
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Generator
+    from collections.abc import Callable, Generator, Sequence
 
     import simpy
 
@@ -24,6 +24,9 @@ if TYPE_CHECKING:
     from reconros_zenoh.rmw.received import Received, Responder
     from reconros_zenoh.ros.types import MessageType, ServiceType
     from reconros_zenoh.transport.base import Parts
+
+
+_AGES_KEPT = 10_000
 
 
 class Event(NamedTuple):
@@ -283,11 +286,14 @@ class _Outgoing(NamedTuple):
 class Writer:
     """Takes messages through the stack and over the link in order, then sends them.
 
-    With KEEP_LAST at most `depth` wait; a further one pushes the oldest out.
+    With KEEP_LAST at most `depth` wait; a further one pushes the oldest out. `sent` counts what has left,
+    `ages_ns` says of the last how old it was then: since the message or timer that it follows from.
     """
 
     def __init__(self, board: Board, qos: QosProfile) -> None:
         self._board = board
+        self.sent = 0
+        self.ages_ns: deque[int] = deque(maxlen=_AGES_KEPT)
         self._stream: Stream[_Outgoing] = Stream(self._send, qos.queue_depth, lambda lost: lost.on_dropped())
 
     @property
@@ -314,6 +320,8 @@ class Writer:
         host = self._board.sending_host
         yield from host.result(host.start(self, outgoing.send))
         self._board.spans.add(outgoing.timeline)
+        self.sent += 1
+        self.ages_ns.append(outgoing.timeline.total_ns)
 
 
 class TopicWriter:
@@ -335,6 +343,16 @@ class TopicWriter:
     def dropped(self) -> int:
         """How many messages were pushed out by newer ones."""
         return self._writer.dropped
+
+    @property
+    def sent(self) -> int:
+        """How many messages have left the board."""
+        return self._writer.sent
+
+    @property
+    def ages_ns(self) -> Sequence[int]:
+        """How old the last of them were when they left, since the message or timer they follow from."""
+        return self._writer.ages_ns
 
     def message(self, **fields: object) -> Any:
         """Return a message of the topic's type with these fields."""

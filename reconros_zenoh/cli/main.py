@@ -39,6 +39,7 @@ _VERBS = {
     "new": ("new", "new"),
     "check": ("check", "check"),
     "run": ("run", "run"),
+    "compare": ("compare", "compare"),
     "gateway": ("gateway", "gateway"),
     "build": ("build", "build"),
     "map": ("map", "map_communication"),

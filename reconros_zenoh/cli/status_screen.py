@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 _CALLBACKS_PER_TABLE = 5
+_AGES = ("p50", "p95", "max")
 
 
 def print_status(console: Console, status: Mapping[str, Any]) -> None:
@@ -50,6 +51,15 @@ def print_status(console: Console, status: Mapping[str, Any]) -> None:
     _print_spans(console, status["spans_ms"])
     _print(
         console,
+        ("publishes", "sent", "dropped", "age [ms]: median", "p95", "max"),
+        (
+            (topic, each["sent"], each["dropped"], *(each[f"age_{figure}_ms"] for figure in _AGES))
+            for topic, each in status["publishers"].items()
+            if each["sent"] or each["dropped"]
+        ),
+    )
+    _print(
+        console,
         ("stream", "passed", "dropped", "waits for room"),
         ((key, hmt["passed"], hmt["dropped"], hmt["waits"]) for key, hmt in status["hmt"].items()),
     )
@@ -58,11 +68,9 @@ def print_status(console: Console, status: Mapping[str, Any]) -> None:
         ("gateway", "hardware-mapped", "software-mapped", "to hardware", "to software"),
         ((g["name"], g["hmt"], g["smt"], g["to_hmt"], g["to_smt"]) for g in status["gateways"]),
     )
-    dropped = {topic: each["dropped"] for topic, each in status["publishers"].items() if each["dropped"]}
-    for what, counts in (("dropped before they were sent", dropped), ("refused", status["rejected"])):
-        if counts:
-            listed = ", ".join(f"{name} {count}" for name, count in counts.items())
-            console.print(Text(f"messages {what}: {listed}", style="yellow"))
+    if status["rejected"]:
+        listed = ", ".join(f"{name} {count}" for name, count in status["rejected"].items())
+        console.print(Text(f"messages refused: {listed}", style="yellow"))
     _print_host(console, status["host"])
 
 
@@ -106,6 +114,10 @@ def _ms(value: float) -> str:
     return f"{value:.3g}" if value < 1000 else f"{value:.0f}"
 
 
+def _cell(value: object) -> str:
+    return "-" if value is None else _ms(value) if isinstance(value, float) else str(value)
+
+
 def _print(console: Console, columns: Iterable[str], rows: Iterable[Iterable[object]]) -> None:
     """Print a table unless it has no rows; numbers stand to the right, and those with a fraction are ms."""
     content = [list(row) for row in rows]
@@ -113,9 +125,9 @@ def _print(console: Console, columns: Iterable[str], rows: Iterable[Iterable[obj
         return
     table = Table(box=SIMPLE_HEAD, show_edge=False, padding=(0, 1, 0, 0))
     for index, column in enumerate(columns):
-        numbers = all(isinstance(row[index], int | float) for row in content)
+        numbers = all(isinstance(row[index], int | float | None) for row in content)
         table.add_column(Text(column), justify="right" if numbers else "left", overflow="fold")
     for row in content:
-        table.add_row(*(Text(_ms(cell) if isinstance(cell, float) else str(cell)) for cell in row))
+        table.add_row(*(Text(_cell(value)) for value in row))
     console.print(table, highlight=False)
     console.print()

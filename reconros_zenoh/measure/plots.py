@@ -63,7 +63,7 @@ def grid_figure(records: Mapping[str, Mapping[str, Record]]) -> Figure:
     from matplotlib.figure import Figure  # noqa: PLC0415  see the module docstring
 
     clients = list(dict.fromkeys(client for row in records.values() for client in row))
-    colours = [_MAPPING_COLOURS[row % len(_MAPPING_COLOURS)] for row in range(len(records))]
+    colours = [mapping_colour(row) for row in range(len(records))]
     with drawing_style():
         figure = Figure(figsize=(1.85 * len(clients) + 0.75, 1.7 * len(records) + 0.7), layout="constrained")
         grid = figure.subplots(len(records), len(clients), squeeze=False)
@@ -88,6 +88,11 @@ def grid_figure(records: Mapping[str, Mapping[str, Record]]) -> Figure:
         known = any(client in reference_cells().get(mapping, {}) for mapping in records for client in clients)
         _legend(figure, "this run", "real board" if known else None, colours)
     return figure
+
+
+def mapping_colour(number: int) -> str:
+    """Return the colour of a mapping by its place among those that are shown, from 0."""
+    return _MAPPING_COLOURS[number % len(_MAPPING_COLOURS)]
 
 
 def spans_figure(spans: Mapping[str, Mapping[str, Mapping[str, float]]]) -> Figure:

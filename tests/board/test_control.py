@@ -105,6 +105,35 @@ def test_the_status_counts_what_was_refused() -> None:
     assert told["callbacks"]["a"]["calls"] == 1
 
 
+def test_the_status_tells_how_old_messages_were_when_they_left() -> None:
+    board = small_board(PROFILE)
+    word = types().message("std_msgs/msg/UInt32")
+    executor = Executor(board, 1, 0)
+    node = board.context.node("server")
+    writer, second, idle = (board.writer(node, word, topic) for topic in ("out", "out", "idle"))
+
+    def answer(message: Any, context: Any) -> None:
+        context.publish(second if message.data else writer, message)
+
+    executor.add_sw_callback("a", CallbackKind.SUB, SubscriptionSource(board, node, word, "in"), answer)
+    executor.spin()
+    publisher = desktop(board).node("client").publisher(word, "in")
+    for number in range(2):
+        publisher.publish(word.cls(data=number))
+    board.environment.run(until=10_000_000)
+    told = status(board, executor)["publishers"]
+    assert told["/idle"] == {
+        "sent": 0,
+        "dropped": idle.dropped,
+        "age_p50_ms": None,
+        "age_p95_ms": None,
+        "age_max_ms": None,
+    }
+    # `a` takes 1 ms in software, and the second message waits for the first.
+    ages = {"age_p50_ms": 1.5, "age_p95_ms": pytest.approx(1.95), "age_max_ms": 2.0}
+    assert told["/out"] == {"sent": 2, "dropped": 0, **ages}
+
+
 def test_in_wall_time_the_status_says_how_late_the_event_loop_was() -> None:
     environment = WallEnvironment()
     board = small_board(PROFILE, environment=environment, threads=1)

@@ -25,7 +25,11 @@ STATUS = {
         }
     },
     "slots": [{"id": 2, "holds": None, "reconfigurations": 0, "reconfiguration_ms": 0.0, "busy_ms": 12.25}],
-    "publishers": {"/out": {"dropped": 0}, "/full": {"dropped": 4}},
+    "publishers": {
+        "/out": {"sent": 2, "dropped": 0, "age_p50_ms": 1.5, "age_p95_ms": 2.25, "age_max_ms": 1e4},
+        "/full": {"sent": 0, "dropped": 4, "age_p50_ms": None, "age_p95_ms": None, "age_max_ms": None},
+        "/idle": {"sent": 0, "dropped": 0, "age_p50_ms": None, "age_p95_ms": None, "age_max_ms": None},
+    },
     "gateways": [],
     "hmt": {},
     "spans_ms": {"sobel": {"dds": 1.5, "memif": 0.25}},
@@ -47,7 +51,8 @@ def test_everything_that_the_board_told_is_shown() -> None:
     assert "slot holds reconfigurations reconfiguring [ms] busy [ms]" in lines
     assert "2 - 0 0 12.2" in lines
     assert lines[lines.index("mean [ms] sobel") + 2 :][:3] == ["dds 1.5", "memif 0.25", "sum 1.75"]
-    assert "messages dropped before they were sent: /full 4" in lines
+    head = lines.index("publishes sent dropped age [ms]: median p95 max")
+    assert lines[head + 2 :][:3] == ["/out 2 0 1.5 2.25 10000", "/full 0 4 - - -", ""]
     assert "messages refused: truncated 3" in lines
     assert lines[-1] == (
         "host: event loop late by 31 us (median), 5 results later than modelled (1234 ms in all)"
@@ -56,7 +61,7 @@ def test_everything_that_the_board_told_is_shown() -> None:
 
 def test_what_there_is_nothing_of_is_left_out() -> None:
     text = "\n".join(printed(STATUS | {"rejected": {}, "publishers": {}, "spans_ms": {}}))
-    for heading in ("gateway", "stream", "refused", "dropped before", "mean"):
+    for heading in ("gateway", "stream", "refused", "publishes", "mean"):
         assert heading not in text
 
 

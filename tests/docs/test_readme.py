@@ -18,9 +18,11 @@ import pytest
 from links import free_endpoint
 from pages import README, ROOT, blocks, invoke
 from processes import Process, run
+from rosbags.rosbag2 import Writer
 
 from reconros_zenoh.applications.roundtrip.kernels.mnist import MODEL
 from reconros_zenoh.experiments.roundtrip import application_folder
+from reconros_zenoh.ros.types import TypeRegistry
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -66,6 +68,10 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     (tmp_path / "my.toml").write_text(mapping, encoding="utf-8")
     shutil.copytree(application_folder(), tmp_path / "my_project")
     shutil.copy(MODEL.parents[1] / "data" / "digits.npz", tmp_path)
+    word = TypeRegistry().message("std_msgs/msg/UInt32")
+    with Writer(tmp_path / "recording", version=9) as bag:
+        angle = bag.add_connection("/angle", word.name, msgdef="uint32 data", rihs01=word.type_hash)
+        bag.write(angle, 0, b"".join(word.encode(word.cls(data=80))))
     (tmp_path / "times.csv").write_text("2.5\n2.6\n41\n", encoding="utf-8")
     return tmp_path
 

@@ -1,0 +1,122 @@
+"""A project under several mappings, with the same to do: what leaves its board how late."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from board_daemon.hosting import BoardOptions
+from reconros_zenoh.board.control import status
+from reconros_zenoh.experiments.simulation import Simulation
+from reconros_zenoh.experiments.stimulus import feed
+from reconros_zenoh.mapping.project_graph import OUTSIDE, read_project_graph, topic_ends
+from reconros_zenoh.measure.record import RecordWriter, RoundTrip
+from reconros_zenoh.measure.statistics import summarise
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from pathlib import Path
+
+    from reconros_zenoh.board.profile import Profile
+    from reconros_zenoh.experiments.stimulus import Stimulus
+    from reconros_zenoh.project.build_cfg import BuildConfiguration
+    from reconros_zenoh.project.loader import Project
+    from reconros_zenoh.project.mapping_file import Mapping as CallbackMapping
+
+_FIGURES = {"median_ms": 50.0, "p95_ms": 95.0, "p99_ms": 99.0, "max_ms": 100.0}
+
+
+@dataclass(frozen=True, slots=True)
+class MappingRun:
+    """What one mapping made of it: the ages [ns] of what left on each topic, and the status at the end.
+
+    An age is the time from the message or timer that a message follows from until it is over the link.
+    """
+
+    seconds: float
+    ages_ns: Mapping[str, list[int]]
+    status: Mapping[str, Any]
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the figures; `busiest` is what was busy for the largest share of the time."""
+        callbacks, slots = self.status["callbacks"].values(), self.status["slots"]
+        published = self.status["publishers"]
+        shares = {f"slot {slot['id']}": slot["busy_ms"] / self.seconds / 1e3 for slot in slots}
+        busiest = max((name for name in shares if shares[name]), key=lambda name: shares[name], default=None)
+        return {
+            "outputs": {
+                topic: _output(published[topic]["sent"] if topic in published else 0, self.seconds, ages_ns)
+                for topic, ages_ns in self.ages_ns.items()
+            },
+            "dropped": sum(callback["dropped"] for callback in callbacks),
+            "refused": sum(self.status["rejected"].values()),
+            "failed": sum(callback["failed"] for callback in callbacks),
+            "reconfigurations": sum(slot["reconfigurations"] for slot in slots),
+            "busiest": busiest and {"what": busiest, "share": shares[busiest]},
+            "status": self.status,
+        }
+
+    def write_records(self, folder: Path) -> None:
+        """Write a record of ages for each topic, `folder/<topic>.csv`, with dots for slashes."""
+        for topic, ages_ns in self.ages_ns.items():
+            with RecordWriter(folder / f"{topic.strip('/').replace('/', '.')}.csv") as writer:
+                for index, age_ns in enumerate(ages_ns):
+                    writer.write(RoundTrip(index, age_ns, "ok"))
+
+
+def outside_topics(configuration: BuildConfiguration, kind: str) -> dict[str, str]:
+    """Return the topics, with their types, that a project has with the outside.
+
+    `kind` is "rossub" for those that it hears, and "rospub" for those that it publishes.
+    """
+    elsewhere = OUTSIDE["rospub" if kind == "rossub" else "rossub"]
+    names = {
+        topic.name
+        for topic in read_project_graph(configuration).topics
+        if elsewhere in (*topic.publishers, *topic.subscribers)
+    }
+    return {
+        end.topic: str(end.resource.interface)
+        for end in topic_ends(configuration)
+        if end.resource.type == kind and end.topic in names
+    }
+
+
+def run_mapping(
+    profile: Profile,
+    project: Project,
+    mapping: CallbackMapping,
+    stimulus: Stimulus,
+    seconds: float,
+    seed: int,
+) -> MappingRun:
+    """Return what the project has made of the stimulus in so many seconds of virtual time.
+
+    Raise UsageError when the board cannot host it. Ages are those of the last 10,000 messages of a topic.
+    """
+    types = project.types()
+    outputs = outside_topics(project.configuration, "rospub")
+    with Simulation(types) as simulation:
+        hosted = simulation.add_board(profile, project, mapping, BoardOptions(seed=seed))
+        desktop = simulation.context().node("desktop")
+        for topic, name in outputs.items():
+            desktop.subscription(types.message(name), topic, lambda _: None)
+        publishers = {
+            topic: desktop.publisher(types.message(name), topic) for topic, name in stimulus.types.items()
+        }
+        environment = simulation.environment
+        environment.process(feed(environment, publishers, stimulus.schedule()))
+        environment.run(until=round(seconds * 1e9))
+        ages_ns: dict[str, list[int]] = {topic: [] for topic in outputs}
+        for writer in hosted.board.writers:
+            if writer.topic in ages_ns:
+                ages_ns[writer.topic] += writer.ages_ns
+        return MappingRun(seconds, ages_ns, status(hosted.board, hosted.executor))
+
+
+def _output(sent: int, seconds: float, ages_ns: list[int]) -> dict[str, Any]:
+    figures = summarise(np.array(ages_ns, np.float64) / 1e6, 0, 0, _FIGURES)
+    ages = {name: figures[name] for name in ("mean_ms", *_FIGURES)}
+    return {"sent": sent, "rate_hz": sent / seconds, **ages}
