@@ -15,7 +15,7 @@ from reconros_zenoh.board.clients import ClientSource
 from reconros_zenoh.board.control import status
 from reconros_zenoh.board.endpoints import ServiceSource, SubscriptionSource, TimerSource
 from reconros_zenoh.board.executor import Executor
-from reconros_zenoh.board.profile import read_profile
+from reconros_zenoh.board.profile import Profile, read_profile
 from reconros_zenoh.clock.virtual import VirtualEnvironment, succeed_once
 from reconros_zenoh.project.loader import load_project
 from reconros_zenoh.rmw.node import Context
@@ -28,7 +28,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from reconros_zenoh.board.endpoints import TopicWriter
-    from reconros_zenoh.board.profile import Profile
     from reconros_zenoh.ros.qos import QosProfile
 
 _SECOND_NS = 1_000_000_000
@@ -170,13 +169,13 @@ class VirtualBoard(VirtualDesktop):
 class VirtualProject(VirtualDesktop):
     """A ReconROS project on an emulated board; its callbacks are served as soon as time passes.
 
-    `mapping` is a name or a file; without one it is that of `reconros run`.
+    `profile` and `mapping` are names or files; without them they are those of `reconros run`.
     """
 
     def __init__(
         self,
         folder: str | Path,
-        profile: str | Profile = "native",
+        profile: str | Profile | None = None,
         *,
         mapping: str | None = None,
         seed: int = 0,
@@ -186,7 +185,7 @@ class VirtualProject(VirtualDesktop):
         self._hosted = HostedBoard(
             self.environment,
             self._context().transport,
-            read_profile(profile) if isinstance(profile, str) else profile,
+            profile if isinstance(profile, Profile) else project.profile(profile),
             project,
             project.mapping(mapping),
             BoardOptions(seed=seed),

@@ -21,6 +21,7 @@ _NAME_AT = _HEADER.size + _CRC.size
 _MAGIC = b"RRZBIT01"
 _LIMIT_BYTES = 1_000_000_000
 _REBUILD = "Write it again with `reconros build`."
+_REBUILD_ALIKE = "Write it again with `reconros build`, with the same --profile."
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,7 +93,7 @@ def read_bitstreams(folder: Path, wanted: Iterable[Bitstream]) -> Mapping[tuple[
             )
         if content.size != bitstream.size:
             raise BitstreamError(
-                path, None, f"has {content.size} bytes; this slot takes {bitstream.size}.", _REBUILD
+                path, None, f"has {content.size} bytes; this slot takes {bitstream.size}.", _REBUILD_ALIKE
             )
         found[bitstream.slot, bitstream.callback] = content
     return found

@@ -8,8 +8,7 @@ from typing import Annotated
 
 import typer
 
-from reconros_zenoh.board.profile import read_profile
-from reconros_zenoh.cli.options import AsJson, project_prints
+from reconros_zenoh.cli.options import AsJson, ProjectProfile, project_prints
 from reconros_zenoh.project.loader import load_project
 
 
@@ -18,19 +17,17 @@ def build(
     out: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Where to write.", show_default="PROJECT/bitstreams")
     ] = None,
-    profile: Annotated[
-        str, typer.Option(metavar="NAME|FILE", help="The kind of board, which decides the sizes.")
-    ] = "miniitx-zynq7100",
+    profile: ProjectProfile = None,
     as_json: AsJson = False,
 ) -> None:
     """Write a project's partial bitstreams.
 
-    One for each callback and each reconfigurable slot it can be built for.
+    One for each callback and each reconfigurable slot it can be built for. The profile decides their sizes.
     """
     folder = out or project / "bitstreams"
     with project_prints(as_json=as_json):
         loaded = load_project(project)
-    bitstreams = loaded.bitstreams(read_profile(profile))
+    bitstreams = loaded.bitstreams(loaded.profile(profile))
     written = [bitstream.write(folder) for bitstream in bitstreams]
     if as_json:
         print(

@@ -23,6 +23,7 @@ from reconros_zenoh.cli.options import (
     MappingName,
     Members,
     ModelSeed,
+    ProjectProfile,
     Router,
 )
 from reconros_zenoh.cli.status_screen import print_status
@@ -72,9 +73,7 @@ def board(
         typer.Argument(help="Folder of a ReconROS project.", show_default="the round-trip application"),
     ] = None,
     mapping: MappingName = None,
-    profile: Annotated[
-        str, typer.Option(metavar="NAME|FILE", help="The kind of board; native models nothing.")
-    ] = "miniitx-zynq7100",
+    profile: ProjectProfile = None,
     name: BoardName = "board0",
     router: Router = ENDPOINT,
     domain: Domain = 0,
@@ -87,19 +86,18 @@ def board(
     """Run an emulated board that hosts a project, until Ctrl-C."""
     from board_daemon.daemon import run_board
     from board_daemon.hosting import BoardOptions
-    from reconros_zenoh.board.profile import read_profile
     from reconros_zenoh.project.loader import load_project
 
     loaded = load_project(project or application_folder())
-    mapped = loaded.mapping(mapping)
+    model, mapped = loaded.profile(profile), loaded.mapping(mapping)
     run_board(
         router,
-        read_profile(profile),
+        model,
         loaded,
         mapped,
         BoardOptions(name, domain, seed, bitstreams, tap),
         lambda: print(
-            f"board {name} serves {loaded.configuration.name} under {mapped.name} on {profile}", flush=True
+            f"board {name} serves {loaded.configuration.name} under {mapped.name} on {model.name}", flush=True
         ),
     )
 

@@ -28,6 +28,14 @@ class ClockName(StrEnum):
 Profile = Annotated[
     str, typer.Option(metavar="NAME|FILE", help="The kind of board; native models nothing (wall time only).")
 ]
+ProjectProfile = Annotated[
+    str | None,
+    typer.Option(
+        metavar="NAME|FILE",
+        help="The kind of board; native models nothing.",
+        show_default="that of TargetBoard, or native",
+    ),
+]
 Out = Annotated[Path, typer.Option(metavar="DIR", help="Folder for the records.")]
 Seed = Annotated[int, typer.Option(min=0, help="Seed of requests and model.")]
 Router = Annotated[

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import logging
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -12,7 +11,6 @@ import typer
 
 from board_daemon.hosting import BoardOptions
 from reconros_zenoh.board.control import status
-from reconros_zenoh.board.profile import profile_names, read_profile
 from reconros_zenoh.cli.console import wide_console
 from reconros_zenoh.cli.options import (
     ENDPOINT,
@@ -23,32 +21,25 @@ from reconros_zenoh.cli.options import (
     Domain,
     MappingName,
     ModelSeed,
+    ProjectProfile,
     Router,
     project_prints,
 )
 from reconros_zenoh.cli.status_screen import print_status
 from reconros_zenoh.project.loader import load_project
-from reconros_zenoh.project.target import target_profile
 
 if TYPE_CHECKING:
     from reconros_zenoh.board.profile import Profile
-    from reconros_zenoh.project.build_cfg import BuildConfiguration
     from reconros_zenoh.project.loader import Project
     from reconros_zenoh.project.mapping_file import Mapping
 
-_log = logging.getLogger(__name__)
 _VIRTUAL_S = 10.0
 
 
 def run(
     project: Annotated[Path, typer.Argument(help="Folder of a ReconROS project.")],
     mapping: MappingName = None,
-    profile: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAME|FILE", help="The kind of board.", show_default="that of TargetBoard, or native"
-        ),
-    ] = None,
+    profile: ProjectProfile = None,
     clock: Annotated[
         ClockName, typer.Option(help="Real time, with a router; or virtual time, in this process alone.")
     ] = ClockName.WALL,
@@ -71,7 +62,7 @@ def run(
     """
     with project_prints(as_json=as_json):
         loaded = load_project(project)
-        model = read_profile(profile or _profile_of(loaded.configuration))
+        model = loaded.profile(profile)
         mapped = loaded.mapping(mapping)
         options = BoardOptions(name, domain, seed, bitstreams)
         if clock is ClockName.VIRTUAL:
@@ -96,17 +87,6 @@ def run(
             print(
                 f"{model.name} models nothing, so nothing took any time. --profile chooses a board that does."
             )
-
-
-def _profile_of(configuration: BuildConfiguration) -> str:
-    found = target_profile(configuration, profile_names())
-    if found is None and (configuration.board or configuration.part):
-        _log.warning(
-            "there is no profile for the board of %s: it runs on native, which models nothing. "
-            "Choose one with --profile.",
-            configuration.path,
-        )
-    return found or "native"
 
 
 def _run_virtual(

@@ -15,7 +15,6 @@ from host_clients.camera import CameraOptions
 from host_clients.daemon import ClientOptions
 from host_clients.desktop import ViewerOptions
 from host_clients.robot import RobotOptions
-from reconros_zenoh.board.profile import read_profile
 from reconros_zenoh.cli import daemons, desktop
 from reconros_zenoh.errors import FileError, UsageError
 from reconros_zenoh.experiments.deployment import BoardPlan, DeploymentPlan
@@ -27,7 +26,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
     from deploy.compose import Service
-    from reconros_zenoh.board.profile import Profile
     from reconros_zenoh.project.loader import Project
 
 _VERBS: dict[str, Callable[..., None]] = {
@@ -50,7 +48,6 @@ def read_deployment(path: Path, environment: Mapping[str, str]) -> DeploymentPla
     services = read_compose(path, environment).services
     nodes = Node.read(path, environment).mapping()["services"].mapping()
     projects = functools.cache(load_project)
-    profiles = functools.cache(read_profile)
     boards: dict[str, BoardPlan] = {}
     clients: dict[str, ClientOptions] = {}
     cameras: dict[str, CameraOptions] = {}
@@ -65,7 +62,7 @@ def read_deployment(path: Path, environment: Mapping[str, str]) -> DeploymentPla
             )
         verb, given = _parse(service, command)
         if verb == "board":
-            board = _board_plan(given, command, projects, profiles)
+            board = _board_plan(given, command, projects)
             if board.options.name in [other.options.name for other in boards.values()]:
                 raise command.error(f"names a second board {board.options.name!r}.", "Give each a --name.")
             boards[name] = board
@@ -96,24 +93,18 @@ def read_deployment(path: Path, environment: Mapping[str, str]) -> DeploymentPla
     return plan
 
 
-def _board_plan(
-    given: Mapping[str, Any],
-    command: Node,
-    projects: Callable[[Path], Project],
-    profiles: Callable[[str], Profile],
-) -> BoardPlan:
+def _board_plan(given: Mapping[str, Any], command: Node, projects: Callable[[Path], Project]) -> BoardPlan:
     """Return what the options of `reconros board` ask for."""
     try:
         project = projects(given["project"] or application_folder())
-        mapping, profile = project.mapping(given["mapping"]), profiles(given["profile"])
+        mapping, profile = project.mapping(given["mapping"]), project.profile(given["profile"])
     except FileError:
         raise
     except UsageError as error:
         raise command.error(f"cannot be run: {error}", "Correct the option.") from None
     if profile.model is None:
         raise command.error(
-            f"takes the profile {given['profile']!r}, which models nothing: nothing would take any "
-            "virtual time.",
+            f"runs on {profile.name}, which models nothing: nothing would take any virtual time.",
             "Give another --profile.",
         )
     options = BoardOptions(given["name"], given["domain"], given["seed"], given["bitstreams"])

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from reconros_zenoh.board.bitstream import Bitstream
 from reconros_zenoh.board.board import SlotPlan
+from reconros_zenoh.board.profile import read_profile
 from reconros_zenoh.errors import FileError, UsageError
 from reconros_zenoh.project.build_cfg import read_build_cfg
 from reconros_zenoh.project.communication import check_fifos, check_places, check_topics
@@ -16,6 +17,7 @@ from reconros_zenoh.project.interfaces import read_interfaces
 from reconros_zenoh.project.main_file import load_main, running_project
 from reconros_zenoh.project.mapping_file import Mapping, built_for, read_mapping
 from reconros_zenoh.project.resources import slot_resources
+from reconros_zenoh.project.target import target_profile
 from reconros_zenoh.text_file import read_text_file
 
 if TYPE_CHECKING:
@@ -71,6 +73,17 @@ class ProjectFiles:
     @cached_property
     def _types(self) -> TypeRegistry:
         return self.interfaces.registry()
+
+    def profile(self, name_or_file: str | None) -> Profile:
+        """Return the profile of that name or in that file; None stands for that of the project's board.
+
+        See `target_profile`.
+        """
+        return read_profile(name_or_file) if name_or_file else self._profile
+
+    @cached_property
+    def _profile(self) -> Profile:
+        return read_profile(target_profile(self.configuration))
 
     def mapping(self, name_or_file: str | None) -> Mapping:
         """Return the mapping of that name in the project's folder `mappings`, or the one in that file.

@@ -87,6 +87,15 @@ def test_the_driving_example_is_simulated_from_the_file_of_up(tmp_path: Path) ->
     assert (cell["n"], cell["lost"], cell["wrong"]) == (5, 0, 0)
 
 
+def test_a_board_is_of_the_kind_that_its_project_is_built_for(tmp_path: Path) -> None:
+    driving = ROOT / "reconros_zenoh" / "applications" / "driving"
+    profiles = []
+    for options in ("", "--profile=miniitx-zynq7100"):
+        file = write_deployment(tmp_path, f"{BOARD} {driving} {options}", "reconros robot")
+        profiles.append(read_deployment(file, {}).boards["s0"].profile.name)
+    assert profiles == ["zcu104", "miniitx-zynq7100"]
+
+
 def test_a_robot_in_a_domain_without_a_board_is_refused(tmp_path: Path) -> None:
     file = write_deployment(tmp_path, BOARD, "reconros robot --domain=3")
     with pytest.raises(FileError, match=r"file\.yaml:5: .* asks in domain 3, where no board is"):
@@ -211,7 +220,8 @@ def test_clients_of_a_group_begin_together() -> None:
         ([BOARD, "reconros client sort --requests 0"], r"services\.s1\.command cannot be run: .*--requests"),
         ([f"{BOARD} --mapping=nowhere"], r"services\.s0\.command cannot be run: no mapping named 'nowhere'"),
         ([f"{BOARD} --profile=nothing"], r"services\.s0\.command cannot be run: .*nothing"),
-        ([f"{BOARD} --profile=native"], r"services\.s0\.command takes the profile 'native'"),
+        ([f"{BOARD} --profile=native"], r"services\.s0\.command runs on native"),
+        ([f"{BOARD} {ECHO}"], r"services\.s0\.command runs on native"),
         ([BOARD, BOARD], r"services\.s1\.command names a second board 'board0'"),
         ([BOARD], r"no client"),
         ([BOARD, "reconros client sort --domain 3"], r"services\.s1\.command asks in domain 3"),
@@ -249,7 +259,7 @@ def test_a_client_whom_nobody_answers_is_named(tmp_path: Path) -> None:
 
 
 def test_a_board_that_cannot_host_its_project_is_named(tmp_path: Path) -> None:
-    board = f"{BOARD} {quote(str(ECHO))} --mapping=software"
+    board = f"{BOARD} {quote(str(ECHO))} --profile=miniitx-zynq7100"
     file = write_deployment(tmp_path, board, "reconros client sort")
     with pytest.raises(
         UsageError, match=r"s0: .*/main\.py:20: profile 'miniitx-zynq7100' has no times for callback 'number'"

@@ -9,9 +9,11 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
+import reconros_zenoh as rz
+from reconros_zenoh.cli.build import build
 from reconros_zenoh.cli.new import new
 from reconros_zenoh.cli.run import run as run_command
-from reconros_zenoh.errors import FileError, UsageError
+from reconros_zenoh.errors import BitstreamError, FileError, UsageError
 from reconros_zenoh.experiments.roundtrip import application_folder
 from reconros_zenoh.project.build_cfg import read_build_cfg
 from reconros_zenoh.project.target import target_profile
@@ -21,6 +23,7 @@ if TYPE_CHECKING:
 
 application = typer.Typer()
 application.command("new")(new)
+application.command("build")(build)
 application.command("run")(run_command)
 
 
@@ -35,6 +38,13 @@ def invoke(*arguments: object) -> str:
 
 def run(*arguments: object) -> Any:
     return json.loads(invoke("run", *arguments, "--clock", "virtual", "--json"))
+
+
+def replace(path: Path, old: str, new: str) -> None:
+    """Write `new` for the one `old` in a file."""
+    text = path.read_text(encoding="utf-8")
+    assert text.count(old) == 1
+    path.write_text(text.replace(old, new), encoding="utf-8")
 
 
 @pytest.fixture
@@ -98,9 +108,7 @@ def test_its_target_board_decides_on_the_profile() -> None:
 
 
 def test_a_board_without_a_profile_is_warned_of(blink: Path, caplog: pytest.LogCaptureFixture) -> None:
-    path = blink / "build.cfg"
-    text = path.read_text(encoding="utf-8")
-    path.write_text(text.replace("TargetOS", "TargetBoard = zybo,b\nTargetOS"), encoding="utf-8")
+    replace(blink / "build.cfg", "TargetOS", "TargetBoard = zybo,b\nTargetOS")
     assert run(blink, "--seconds", 1)["profile"] == "native"
     assert "no profile for the board" in caplog.text
 
@@ -112,16 +120,33 @@ def test_a_board_without_a_profile_is_warned_of(blink: Path, caplog: pytest.LogC
         ("TargetPart = XC7Z100ffg900-2", "miniitx-zynq7100"),
         ("TargetBoard = zcu104,revd", "zcu104"),
         ("TargetPart = xczu7ev-ffvc1156-2-e", "zcu104"),
-        ("TargetBoard = zedboard,c\nTargetPart = xc7z020clg484-1", None),
-        ("TargetOS = linux", None),
+        ("TargetBoard = zedboard,c\nTargetPart = xc7z020clg484-1", "native"),
+        ("TargetOS = linux", "native"),
     ],
 )
-def test_the_profile_of_a_board(tmp_path: Path, general: str, profile: str | None) -> None:
+def test_the_profile_of_a_board(tmp_path: Path, general: str, profile: str) -> None:
     path = tmp_path / "build.cfg"
     path.write_text(f"[General]\nName = x\n{general}\n", encoding="utf-8")
-    found = target_profile(read_build_cfg(path), ["miniitx-zynq7100", "native", "zcu104"])
-    assert found == profile
-    assert target_profile(read_build_cfg(path), ["native"]) is None
+    assert target_profile(read_build_cfg(path)) == profile
+
+
+@pytest.mark.parametrize(
+    ("general", "profile"),
+    [("TargetBoard = zcu104,d", "zcu104"), ("TargetPart = xc7z100", "miniitx-zynq7100"), ("", "native")],
+)
+def test_every_verb_takes_the_profile_of_the_same_board(blink: Path, general: str, profile: str) -> None:
+    replace(blink / "build.cfg", "TargetOS", f"{general}\nTargetOS")
+    replace(blink / "main.py", "count.hardware", "count.hardware, hardware_timing=rz.Cycles(1)")
+    replace(blink / "main.py", "from", "import reconros_zenoh as rz\nfrom")
+    invoke("build", blink)
+    assert run(blink, "--seconds", 1, "--bitstreams", blink / "bitstreams")["profile"] == profile
+    assert rz.VirtualProject(blink).status()["profile"] == profile
+
+
+def test_a_bitstream_for_another_profile_says_what_to_build(blink: Path) -> None:
+    invoke("build", blink, "--profile", "zcu104")
+    with pytest.raises(BitstreamError, match=r"`reconros build`, with the same --profile\."):
+        run(blink, "--bitstreams", blink / "bitstreams")
 
 
 def test_a_callback_without_times_is_refused_with_the_line_that_registers_it(blink: Path) -> None:

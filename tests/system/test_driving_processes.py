@@ -22,7 +22,7 @@ def test_a_board_drives_the_robot(endpoint: str, tmp_path: Path) -> None:
     ):
         router.wait_for("router listens on", endpoint)
         with Process("board", project, "--router", endpoint) as board:
-            board.wait_for("board board0 serves driving")
+            board.wait_for("board board0 serves driving under default on zcu104")
             arguments = ("--router", endpoint, "--pictures", "5", "--out", tmp_path, "--view", "0")
             with Process("robot", *arguments) as robot:
                 robot.wait_for("robot: ready, the pictures are at")
