@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -29,6 +30,8 @@ if TYPE_CHECKING:
     from reconros_zenoh.project.build_cfg import BuildConfiguration
     from reconros_zenoh.project.interfaces import Interfaces
     from reconros_zenoh.ros.types import TypeRegistry
+
+_log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -183,8 +186,13 @@ def read_project(folder: Path) -> ProjectFiles:
 
 
 def load_project(folder: Path) -> Project:
-    """Return the project in a folder; raise FileError for what is missing or wrong in it."""
+    """Return the project in a folder; raise FileError for what is missing or wrong in it.
+
+    The warnings of its build.cfg are logged: what was left out there shows as mistakes elsewhere.
+    """
     files = read_project(folder)
+    for warning in files.configuration.warnings:
+        _log.warning("%s", warning)
     main = load_main(folder, files.configuration.name)
     return Project(folder, files.configuration, files.interfaces, main)
 

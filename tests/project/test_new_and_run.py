@@ -21,6 +21,8 @@ from reconros_zenoh.project.target import target_profile
 if TYPE_CHECKING:
     from pathlib import Path
 
+APPLICATIONS = application_folder().parent
+
 application = typer.Typer()
 application.command("new")(new)
 application.command("build")(build)
@@ -111,6 +113,31 @@ def test_a_board_without_a_profile_is_warned_of(blink: Path, caplog: pytest.LogC
     replace(blink / "build.cfg", "TargetOS", "TargetBoard = zybo,b\nTargetOS")
     assert run(blink, "--seconds", 1)["profile"] == "native"
     assert "no profile for the board" in caplog.text
+
+
+@pytest.mark.parametrize("misspelt", ["Slots = slot(0)", "SwSourc = c"])
+def test_what_build_cfg_says_in_vain_is_warned_of_once(
+    blink: Path, caplog: pytest.LogCaptureFixture, misspelt: str
+) -> None:
+    replace(blink / "build.cfg", "SwSource = c", f"SwSource = c\n{misspelt}")
+    run(blink, "--seconds", 1)
+    warnings = [record.getMessage() for record in caplog.records]
+    name = misspelt.partition(" ")[0]
+    assert [f"the unknown option {name} is left out." in warning for warning in warnings] == [True]
+
+
+def test_a_mistake_that_follows_from_a_warning_comes_behind_it(
+    blink: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    replace(blink / "build.cfg", "ReconosThread@", "ReconosThred@")
+    with pytest.raises(FileError, match="no callback 'count'"):
+        run(blink)
+    assert f"{blink / 'build.cfg'}:24: the unknown section [ReconosThred@count] is left out." in caplog.text
+
+
+@pytest.mark.parametrize("path", sorted(APPLICATIONS.rglob("build.cfg")), ids=str)
+def test_shipped_projects_are_read_without_a_warning(path: Path) -> None:
+    assert read_build_cfg(path).warnings == ()
 
 
 @pytest.mark.parametrize(
