@@ -15,7 +15,7 @@ from rich.text import Text
 
 from reconros_zenoh.board.profile import read_profile
 from reconros_zenoh.cli.console import wide_console
-from reconros_zenoh.cli.options import ENDPOINT, AsJson, Domain, Router
+from reconros_zenoh.cli.options import ENDPOINT, AsJson, Domain, MappingName, Router
 from reconros_zenoh.cli.printable import printable
 from reconros_zenoh.errors import UsageError
 from reconros_zenoh.mapping.communication import Crossings, map_topics
@@ -29,17 +29,17 @@ if TYPE_CHECKING:
 
     from rich.console import Console
 
+    from reconros_zenoh.mapping.communication import TopicMapping
     from reconros_zenoh.mapping.graph import ComputationGraph, Edge
-    from reconros_zenoh.project.build_cfg import BuildConfiguration
+    from reconros_zenoh.project.loader import ProjectFiles
     from reconros_zenoh.project.mapping_file import Mapping as NodeMapping
 
 
-class _Source(NamedTuple):
-    """A graph, and what `--apply` needs where it is that of a project."""
+class _MappedProject(NamedTuple):
+    """A project, and which of its callbacks runs where."""
 
-    graph: ComputationGraph
-    configuration: BuildConfiguration | None = None
-    node_mapping: NodeMapping | None = None
+    files: ProjectFiles
+    mapping: NodeMapping
 
 
 def map_communication(
@@ -58,14 +58,7 @@ def map_communication(
             metavar="NODE", help="With --live: a node in hardware; may be repeated.", show_default=False
         ),
     ] = None,
-    mapping: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAME|FILE",
-            help="Which callback of the project runs where.",
-            show_default="in hardware what has a HwSource",
-        ),
-    ] = None,
+    mapping: MappingName = None,
     model: Annotated[
         str | None,
         typer.Option(
@@ -89,10 +82,12 @@ def map_communication(
     """
     if hardware and not live:
         raise UsageError("--hardware names nodes of --live; projects and graph files say it themselves.")
-    read = _read_live(router, domain, hardware or [], source) if live else _read(source, mapping)
-    if read.configuration is None and (mapping is not None or apply):
+    if live:
+        graph, project = _read_live(router, domain, hardware or [], source), None
+    else:
+        graph, project = _read(source, mapping)
+    if project is None and (mapping is not None or apply):
         raise UsageError(f"{'--apply' if apply else '--mapping'} needs the folder of a project.")
-    graph = read.graph
     rule = map_topics(graph)
     predictions = Predictions.of(graph, read_profile(model), rule) if model else None
     mappings = predictions.mappings if predictions else {name: each.mapping for name, each in rule.items()}
@@ -101,12 +96,8 @@ def map_communication(
         from reconros_zenoh.mapping.drawing import write_drawing  # loads networkx
 
         write_drawing(plot, graph, mappings)
-    if read.configuration is not None:
-        result["warnings"] += read.configuration.warnings
-        if apply:
-            from reconros_zenoh.mapping.apply import apply_mapping
-
-            result["applied"] = apply_mapping(read.configuration, read.node_mapping, mappings)
+    if project is not None:
+        _add_project(result, project, mappings, apply=apply)
     if as_json:
         print(json.dumps(result))
         return
@@ -119,30 +110,49 @@ def map_communication(
         print("\n".join(result["applied"]) or "build.cfg has all of this already")
 
 
-def _read(source: Path | None, mapping: str | None) -> _Source:
+def _read(source: Path | None, mapping: str | None) -> tuple[ComputationGraph, _MappedProject | None]:
     if source is None:
         raise UsageError("nothing to map. Give the folder of a project, a graph file (*.yaml), or --live.")
     if source.suffix in {".yaml", ".yml"}:
-        return _Source(read_graph_file(source))
+        return read_graph_file(source), None
     if not source.is_dir():
         raise UsageError(f"{source} is no folder. Give that of a ReconROS project, or a graph file (*.yaml).")
     from reconros_zenoh.mapping.project_graph import read_project_graph
     from reconros_zenoh.project.loader import read_project
 
-    project = read_project(source)
-    node_mapping = project.mapping(mapping) if mapping else None
-    graph = read_project_graph(project.configuration, node_mapping)
-    return _Source(graph, project.configuration, node_mapping)
+    files = read_project(source)
+    project = _MappedProject(files, files.mapping(mapping))
+    return read_project_graph(files.configuration, project.mapping), project
 
 
-def _read_live(router: str, domain: int, hardware: list[str], source: Path | None) -> _Source:
+def _add_project(
+    result: dict[str, Any], project: _MappedProject, mappings: Mapping[str, TopicMapping], *, apply: bool
+) -> None:
+    """Add what is to be said of the project; with `apply` write the mapping, and add what that changes."""
+    from reconros_zenoh.mapping.apply import apply_mapping
+    from reconros_zenoh.mapping.project_graph import shared_slots
+    from reconros_zenoh.project.loader import read_project
+
+    files = project.files
+    result["notes"] += shared_slots(files.configuration, project.mapping, mappings)
+    result["warnings"] += files.configuration.warnings
+    if apply:
+        before = files.unusable_mappings()
+        result["applied"] = apply_mapping(files.configuration, project.mapping, mappings)
+        after = read_project(files.folder).unusable_mappings()
+        result["warnings"] += [
+            f"{path} cannot be used any more: {error}" for path, error in after.items() if path not in before
+        ]
+
+
+def _read_live(router: str, domain: int, hardware: list[str], source: Path | None) -> ComputationGraph:
     if source is not None:
         raise UsageError(f"--live reads what runs, and nothing from {source}. Give one of the two.")
     from reconros_zenoh.mapping.live_graph import read_live_graph
     from reconros_zenoh.transport.zenoh import ZenohTransport
 
     with ZenohTransport.open(router) as transport:
-        return _Source(read_live_graph(transport, domain, hardware))
+        return read_live_graph(transport, domain, hardware)
 
 
 def _print(console: Console, result: Mapping[str, Any], crossings: Crossings) -> None:

@@ -191,10 +191,11 @@ def _mapped_project(applied: frozenset[TopicMapping]) -> ProjectFiles:
         copy = Path(folder) / "driving"
         shutil.copytree(shipped, copy)
         project = read_project(copy)
-        decisions = map_topics(read_project_graph(project.configuration))
+        mapping = project.mapping(None)
+        decisions = map_topics(read_project_graph(project.configuration, mapping))
         apply_mapping(
             project.configuration,
-            None,
+            mapping,
             {
                 topic: decision.mapping if decision.mapping in applied else TopicMapping.SOFTWARE
                 for topic, decision in decisions.items()

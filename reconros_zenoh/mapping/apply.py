@@ -26,7 +26,7 @@ _WORD = re.compile(r'"[^"\n]*"|[^\s,"]+')
 
 
 def apply_mapping(
-    configuration: BuildConfiguration, node_mapping: NodeMapping | None, mappings: Mapping[str, TopicMapping]
+    configuration: BuildConfiguration, node_mapping: NodeMapping, mappings: Mapping[str, TopicMapping]
 ) -> list[str]:
     """Write the mapping of topics into the project file; return what was changed, nothing if all is there.
 

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from itertools import product
 from typing import TYPE_CHECKING, NamedTuple
 
+from reconros_zenoh.mapping.communication import TopicMapping
 from reconros_zenoh.mapping.graph import ComputationGraph, Side, Topic
 from reconros_zenoh.project.communication import endpoint_name, gateway_pair
 
 if TYPE_CHECKING:
-    from reconros_zenoh.project.build_cfg import BuildConfiguration, ReconosThread
+    from collections.abc import Mapping as Map
+
+    from reconros_zenoh.project.build_cfg import BuildConfiguration
     from reconros_zenoh.project.mapping_file import Mapping
     from reconros_zenoh.project.resource_groups import Resource
 
@@ -17,11 +21,12 @@ OUTSIDE = {"rospub": "(from outside)", "rossub": "(to outside)"}
 
 
 class TopicEnd(NamedTuple):
-    """A rossub or rospub of a project: its topic's full name, and the sides of the threads that use it."""
+    """A rossub or rospub of a project: its topic's full name, the threads that use it, and their sides."""
 
     resource: Resource
     node: str
     topic: str
+    threads: tuple[str, ...]
     sides: frozenset[Side]
 
 
@@ -31,18 +36,14 @@ def gateway_topics(configuration: BuildConfiguration) -> dict[str, str]:
     return {pair.hmt: pair.smt for pair in pairs}
 
 
-def topic_ends(configuration: BuildConfiguration, mapping: Mapping | None = None) -> list[TopicEnd]:
+def topic_ends(configuration: BuildConfiguration, mapping: Mapping) -> list[TopicEnd]:
     """Return all ends of topics in the order of the file; FileError for a name that ROS 2 does not allow.
 
-    A thread is in hardware if `mapping` gives it a slot, without a mapping if it has a hardware source. A
-    group that no thread uses belongs to main.py: software. The hardware-mapped topic of a gateway has the
-    name of its software-mapped one, because both are one topic of the application.
+    A thread is in hardware if `mapping` gives it a slot. A group that no thread uses belongs to main.py:
+    software. The hardware-mapped topic of a gateway has the name of its software-mapped one, because both are
+    one topic of the application.
     """
     gateways = gateway_topics(configuration)
-    sides: dict[str, set[Side]] = {}
-    for thread in configuration.threads:
-        for group in thread.resource_groups:
-            sides.setdefault(group, set()).add(_side(thread, mapping))
     ends = []
     for resource in configuration.resources:
         if resource.type not in {"rossub", "rospub"}:
@@ -51,12 +52,16 @@ def topic_ends(configuration: BuildConfiguration, mapping: Mapping | None = None
         topic = endpoint_name(configuration.path, resource)
         if resource.hardware_mapped:
             topic = gateways.get(topic, topic)
-        used_on = frozenset(sides.get(resource.group, {Side.SOFTWARE}))
-        ends.append(TopicEnd(resource, f"/{resource.node.lstrip('/')}", topic, used_on))
+        threads = tuple(
+            thread.name for thread in configuration.threads if resource.group in thread.resource_groups
+        )
+        in_slots = {bool(mapping.callbacks[thread].slots) for thread in threads} or {False}
+        sides = frozenset(Side.HARDWARE if each else Side.SOFTWARE for each in in_slots)
+        ends.append(TopicEnd(resource, f"/{resource.node.lstrip('/')}", topic, threads, sides))
     return ends
 
 
-def read_project_graph(configuration: BuildConfiguration, mapping: Mapping | None = None) -> ComputationGraph:
+def read_project_graph(configuration: BuildConfiguration, mapping: Mapping) -> ComputationGraph:
     """Return the graph of all nodes that have topics; see `topic_ends` for what is in hardware.
 
     A ROS node with callbacks on both sides becomes a node on each. A topic of which the project has only
@@ -86,17 +91,42 @@ def read_project_graph(configuration: BuildConfiguration, mapping: Mapping | Non
             nodes[OUTSIDE["rossub"]] = Side.SOFTWARE
     topics = tuple(Topic(name, tuple(of["rospub"]), tuple(of["rossub"])) for name, of in found.items())
     elsewhere = [name for name in OUTSIDE.values() if name in nodes]
-    return ComputationGraph(nodes, topics, _notes(configuration, elsewhere))
+    return ComputationGraph(nodes, topics, _notes(configuration, mapping, elsewhere))
 
 
-def _side(thread: ReconosThread, mapping: Mapping | None) -> Side:
-    in_hardware = thread.hardware is not None if mapping is None else mapping.callbacks[thread.name].slots
-    return Side.HARDWARE if in_hardware else Side.SOFTWARE
+def shared_slots(
+    configuration: BuildConfiguration, mapping: Mapping, mappings: Map[str, TopicMapping]
+) -> list[str]:
+    """Return a sentence for each two callbacks that share slots and are joined by a stream.
 
-
-def _notes(configuration: BuildConfiguration, outside: list[str]) -> tuple[str, ...]:
-    types = {resource.type for resource in configuration.resources}
+    Streams are the topics that `mappings` has in T_HW or T_GW.
+    """
+    ends = [
+        end for end in topic_ends(configuration, mapping) if mappings[end.topic] is not TopicMapping.SOFTWARE
+    ]
+    publishers = [end for end in ends if end.resource.type == "rospub"]
+    subscribers = [end for end in ends if end.resource.type == "rossub"]
+    streams: dict[tuple[str, str], dict[str, None]] = {}
+    for publisher, subscriber in product(publishers, subscribers):
+        if publisher.topic == subscriber.topic:
+            for pair in product(publisher.threads, subscriber.threads):
+                streams.setdefault(pair, {})[publisher.topic] = None
     notes = []
+    for (publishes, subscribes), topics in streams.items():
+        first, second = (mapping.callbacks[name].slots for name in (publishes, subscribes))
+        shared = sorted(set(first) & set(second))
+        if shared and publishes != subscribes:
+            notes.append(
+                f"{publishes} and {subscribes} share slot{'s' * (len(shared) > 1)} "
+                f"{', '.join(map(str, shared))}: a stream between them ({', '.join(topics)}) may block, or "
+                "reconfigure a slot for each message."
+            )
+    return notes
+
+
+def _notes(configuration: BuildConfiguration, mapping: Mapping, outside: list[str]) -> tuple[str, ...]:
+    types = {resource.type for resource in configuration.resources}
+    notes = [f"Callbacks are where the mapping {mapping.name!r} has them; --mapping chooses another."]
     if types & {"rossrvs", "rossrvc", "rosactions", "rosactionc"}:
         notes.append("Services and actions are left out: they stay in software.")
     notes += [

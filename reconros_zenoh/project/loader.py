@@ -105,6 +105,16 @@ class ProjectFiles:
         check_places(self.configuration, mapping.callbacks)
         return mapping
 
+    def unusable_mappings(self) -> dict[Path, FileError]:
+        """Return those of the mapping files that the project refuses, each with why."""
+        refused = {}
+        for name, path in self.mapping_files().items():
+            try:
+                self.mapping(name)
+            except FileError as error:
+                refused[path] = error
+        return refused
+
     def mapping_path(self, name_or_file: str) -> Path:
         """Return where the mapping stands; raise UsageError when there is none of that name."""
         shipped = self.mapping_files()

@@ -130,7 +130,8 @@ def test_the_map_finds_in_each_picture_what_was_in_the_one_before() -> None:
 
 def test_the_method_finds_the_gateway_of_the_paper() -> None:
     with as_file(files("reconros_zenoh.applications.driving")) as folder:
-        graph = read_project_graph(read_project(folder).configuration)
+        project = read_project(folder)
+    graph = read_project_graph(project.configuration, project.mapping(None))
     mappings = {topic: decision.mapping for topic, decision in map_topics(graph).items()}
     assert [topic for topic, mapping in mappings.items() if mapping == "gateway"] == ["/image"]
     assert [topic for topic, mapping in mappings.items() if mapping == "hardware"] == [

@@ -149,6 +149,55 @@ def test_a_mapping_of_the_project(tmp_path: Path) -> None:
     assert result["t_sw"] == ["/edges", "/image", "/vision/lane/found"]
 
 
+HARD = """\
+executor = "reconros"
+software_workers = 1
+[callbacks]
+edge.slots = [0]
+lane.slots = [1]
+viewer.software = true
+"""
+SOFT = HARD.replace("lane.slots = [1]", "lane.software = true")
+
+
+def write_mappings(folder: Path, **mappings: str) -> None:
+    (folder / "mappings").mkdir()
+    for name, text in mappings.items():
+        (folder / "mappings" / f"{name}.toml").write_text(text, encoding="utf-8")
+
+
+def test_without_a_mapping_it_takes_that_of_run_and_says_which(tmp_path: Path) -> None:
+    write(tmp_path)
+    assert "Callbacks are where the mapping 'default' has them" in run_json(tmp_path)["notes"][0]
+    write_mappings(tmp_path, a_soft=SOFT, hard=HARD)
+    result = run_json(tmp_path)
+    assert "Callbacks are where the mapping 'a_soft' has them" in result["notes"][0]
+    assert (result["t_hw"], result["t_gw"]) == ([], [])
+    assert result == run_json(tmp_path, "--mapping", "a_soft")
+    assert run_json(tmp_path, "--mapping", "hard")["t_hw"] == ["/edges"]
+
+
+def test_mappings_that_a_change_makes_unusable_are_named(tmp_path: Path) -> None:
+    write(tmp_path)
+    write_mappings(tmp_path, a_soft=SOFT, broken="executor = 1", hard=HARD)
+    warnings = run_json(tmp_path, "--mapping", "hard", "--apply")["warnings"]
+    (about_soft,) = warnings
+    path = tmp_path / "mappings" / "a_soft.toml"
+    assert about_soft.startswith(f"{path} cannot be used any more: {tmp_path / 'build.cfg'}:")
+    assert "The callback lane is mapped to software, but" in about_soft
+    assert run_json(tmp_path, "--mapping", "hard", "--apply")["warnings"] == []
+    with pytest.raises(FileError, match="The callback lane is mapped to software"):
+        run(tmp_path)
+
+
+def test_a_stream_through_a_shared_slot_is_noted(tmp_path: Path) -> None:
+    note = "edge and lane share slot 0: a stream between them (/edges) may block"
+    shared = CAMERA.replace("slot(1)", "slot(0)").replace("Reconfigurable = false", "Reconfigurable = true")
+    write(tmp_path, shared)
+    assert note in run_json(tmp_path)["notes"][-1]
+    assert note in run(tmp_path, columns=200)
+
+
 def test_warnings_of_the_project_file_are_told(tmp_path: Path) -> None:
     write(tmp_path, f"{CAMERA}\n[Unheard@of]\n")
     assert any("unknown section [Unheard@of]" in warning for warning in run_json(tmp_path)["warnings"])

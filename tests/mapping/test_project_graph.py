@@ -11,7 +11,7 @@ from reconros_zenoh.errors import FileError
 from reconros_zenoh.experiments.roundtrip import application_folder
 from reconros_zenoh.mapping.communication import TopicMapping, map_topics
 from reconros_zenoh.mapping.graph import ComputationGraph, Side, Topic
-from reconros_zenoh.mapping.project_graph import OUTSIDE, read_project_graph
+from reconros_zenoh.mapping.project_graph import OUTSIDE, read_project_graph, shared_slots
 from reconros_zenoh.project.loader import load_project
 from reconros_zenoh.project.mapping_file import CallbackMapping, Mapping
 
@@ -22,12 +22,18 @@ HW, SW = Side.HARDWARE, Side.SOFTWARE
 FROM_OUTSIDE, TO_OUTSIDE = OUTSIDE.values()
 
 
+def graph_of(folder: Path, text: str = CAMERA) -> ComputationGraph:
+    """Return the graph of this project file under the mapping of a project without mapping files."""
+    configuration = read(folder, text)
+    return read_project_graph(configuration, Mapping.default(configuration))
+
+
 def topics(graph: ComputationGraph) -> dict[str, tuple[str, str]]:
     return {t.name: (" ".join(t.publishers), " ".join(t.subscribers)) for t in graph.topics}
 
 
 def test_nodes_and_topics_have_their_full_names(tmp_path: Path) -> None:
-    graph = read_project_graph(read(tmp_path))
+    graph = graph_of(tmp_path)
     assert graph.nodes == {"/edge": HW, "/vision/lane": HW, "/viewer": SW, FROM_OUTSIDE: SW}
     assert topics(graph) == {
         "/image": (FROM_OUTSIDE, "/edge /vision/lane"),
@@ -47,7 +53,7 @@ def test_what_nobody_in_the_project_reads_leaves_it(tmp_path: Path) -> None:
     alone = CAMERA[: CAMERA.index("[ResourceGroup@viewer]")] + (
         "[ReconosThread@lane]\nSlot = slot(1)\nHwSource = hls\nResourceGroup = lane\n"
     )
-    graph = read_project_graph(read(tmp_path, alone))
+    graph = graph_of(tmp_path, alone)
     assert topics(graph)["/vision/lane/found"] == ("/vision/lane", TO_OUTSIDE)
     # No thread uses the group of /edge: main.py does, in software.
     assert graph.nodes["/edge"] is SW
@@ -71,9 +77,24 @@ def test_a_mapping_decides_what_is_in_hardware(tmp_path: Path) -> None:
     assert {decision.mapping for decision in decisions.values()} == {TopicMapping.SOFTWARE}
 
 
+def test_a_stream_between_callbacks_that_share_slots_is_noted(tmp_path: Path) -> None:
+    configuration = read(tmp_path)
+    in_hardware = dict.fromkeys(("/image", "/edges", "/vision/lane/found"), TopicMapping.HARDWARE)
+
+    def notes(edge: tuple[int, ...], lane: tuple[int, ...]) -> list[str]:
+        return shared_slots(configuration, mapping_of(edge=edge, lane=lane, viewer=()), in_hardware)
+
+    assert notes((0,), (1,)) == []
+    (note,) = notes((0,), (0,))
+    assert note.startswith("edge and lane share slot 0: a stream between them (/edges) may block, or reconf")
+    assert notes((2, 0, 1), (1, 2))[0].startswith("edge and lane share slots 1, 2: ")
+    in_hardware["/edges"] = TopicMapping.SOFTWARE
+    assert notes((0,), (0,)) == []
+
+
 def test_a_node_with_callbacks_on_both_sides_is_a_node_on_each(tmp_path: Path) -> None:
     both = CAMERA.replace('"/vision/lane"', '"/edge"').replace("HwSource = hls\nSwSource", "SwSource")
-    graph = read_project_graph(read(tmp_path, both))
+    graph = graph_of(tmp_path, both)
     inside = {"/edge (hardware)": HW, "/edge (software)": SW, "/viewer": SW}
     assert graph.nodes == inside | {FROM_OUTSIDE: SW, TO_OUTSIDE: SW}
     assert topics(graph)["/edges"] == ("/edge (hardware)", "/edge (software)")
@@ -84,14 +105,14 @@ def test_the_two_topics_of_a_gateway_are_one(tmp_path: Path) -> None:
         'image = rossub, node, image_msg, "/image"\n',
         'image = rossub, node, sensor_msgs/Image, "/stream", hw\n',
     )
-    assert topics(
-        read_project_graph(read(tmp_path, streamed + gateway("image", 2, "/stream", "/image")))
-    ) == topics(read_project_graph(read(tmp_path)))
+    assert topics(graph_of(tmp_path, streamed + gateway("image", 2, "/stream", "/image"))) == topics(
+        graph_of(tmp_path)
+    )
 
 
 def test_a_gateway_has_ends_in_software_even_if_the_project_has_none(tmp_path: Path) -> None:
     edges = gateway("edges", 2, "/stream", "/edges")
-    assert topics(read_project_graph(read(tmp_path, CAMERA + edges)))["/edges"] == (
+    assert topics(graph_of(tmp_path, CAMERA + edges))["/edges"] == (
         "/edge",
         f"/vision/lane {TO_OUTSIDE}",
     )
@@ -99,7 +120,7 @@ def test_a_gateway_has_ends_in_software_even_if_the_project_has_none(tmp_path: P
 
 def test_a_name_that_ros_2_does_not_allow(tmp_path: Path) -> None:
     with pytest.raises(FileError, match="left arm") as caught:
-        read_project_graph(read(tmp_path, CAMERA.replace('"/edges"', '"/left arm"')))
+        graph_of(tmp_path, CAMERA.replace('"/edges"', '"/left arm"'))
     assert caught.value.line == CAMERA[: CAMERA.index('"/edges"')].count("\n") + 1
 
 
