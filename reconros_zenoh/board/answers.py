@@ -92,8 +92,12 @@ class StatusAnswer(_Part):
 
 
 class GatewayAnswer(_Part):
-    """What `reconros/<board>/gateway` answers; `refused` says why none was added."""
+    """What `reconros/<board>/gateway` answers.
+
+    `refused` says why none was added, `warning` what is odd about the one that was.
+    """
 
     version: Literal[1]
     gateways: list[_Gateway]
     refused: str | None
+    warning: str | None

@@ -63,43 +63,61 @@ class GatewayServer:
         self._board.environment.post(self._reply, request)
 
     def _reply(self, request: Request) -> None:
-        refused = None
+        refused = warning = None
         try:
-            self._add(request.read())
+            warning = self._add(request.read())
         except UsageError as error:
             refused = str(error)
         except ValidationError as error:
             refused = f"no request: {error.errors()[0]['msg']}"
         except ValueError as error:
             refused = f"no request: {error!r}"
-        answer = {"version": VERSION, "gateways": gateways(self._board), "refused": refused}
-        request.reply((msgpack.packb(answer),), None)
+        answer = {"gateways": gateways(self._board), "refused": refused, "warning": warning}
+        request.reply((msgpack.packb({"version": VERSION, **answer}),), None)
 
-    def _add(self, payload: memoryview) -> None:
+    def _add(self, payload: memoryview) -> str | None:
+        """Add the gateway that is asked for, if any; return what is odd about it."""
         question = _Question.model_validate(msgpack.unpackb(payload))
         if question.version != VERSION:
             raise UsageError(f"board {self._board.name!r} speaks version {VERSION} of the gateway.")
         wanted = question.add
-        if wanted is not None:
-            hmt, smt = (resolve(topic, "/", wanted.name) for topic in (wanted.hmt, wanted.smt))
-            message_type, qos = self._types.message(wanted.type), QosProfile.of_words(wanted.qos)
-            self._board.add_gateway(
-                wanted.name, hmt, smt, message_type, self._free_slot(), qos, at_power_up=False
+        if wanted is None:
+            return None
+        hmt, smt = (resolve(topic, "/", wanted.name) for topic in (wanted.hmt, wanted.smt))
+        message_type, qos = self._types.message(wanted.type), QosProfile.of_words(wanted.qos)
+        unused = self._unused(hmt)
+        slot = self._free_slot()
+        if slot is None:
+            raise UsageError(
+                f"board {self._board.name!r} has no slot for a gateway: it has no reconfigurable slot "
+                "without a callback or a gateway. Add one to its build.cfg, or declare the gateway there."
+                + (f" Besides, {unused}" if unused else "")
             )
+        self._board.add_gateway(wanted.name, hmt, smt, message_type, slot, qos, at_power_up=False)
+        return unused
 
-    def _free_slot(self) -> int:
-        """Return the first slot that can be given to a gateway while the board runs."""
-        for slot_id, slot in sorted(self._board.slots.items()):
-            if slot.reconfigurable and not slot.tenants:
-                return slot_id
-        raise UsageError(
-            f"board {self._board.name!r} has no slot for a gateway: it has no reconfigurable slot without a "
-            "callback or a gateway. Add one to its build.cfg, or declare the gateway there."
+    def _unused(self, hmt: str) -> str | None:
+        """Return in a sentence that no callback has an end of this hardware-mapped topic, None if one has."""
+        streams = [name for name, topic in self._board.hardware_topics.items() if topic.has_callback]
+        if hmt in streams:
+            return None
+        return (
+            f"no callback of board {self._board.name!r} has a hardware-mapped end of {hmt}. "
+            f"Its streams: {', '.join(streams) or 'none'}."
         )
 
+    def _free_slot(self) -> int | None:
+        """Return the first slot that can be given to a gateway while the board runs, None without one."""
+        free = (
+            slot_id
+            for slot_id, slot in sorted(self._board.slots.items())
+            if slot.reconfigurable and not slot.tenants
+        )
+        return next(free, None)
 
-def ask_gateways(transport: Transport, board: str, add: dict[str, Any] | None = None) -> list[dict[str, Any]]:
-    """Return the gateways of the board of that name.
+
+def ask_gateways(transport: Transport, board: str, add: dict[str, Any] | None = None) -> dict[str, Any]:
+    """Return the `gateways` of the board of that name, and a `warning` about an added one, or None.
 
     `add` is one to be declared first: its `name`, the absolute topic names `hmt` and `smt`, its `type`
     (`sensor_msgs/msg/Image`), and its `qos` in words (`QosProfile.of_words`). Raise UsageError when the board
@@ -109,8 +127,7 @@ def ask_gateways(transport: Transport, board: str, add: dict[str, Any] | None = 
     answer = ask(transport, board, "gateway", msgpack.packb(question), GatewayAnswer)
     if answer["refused"] is not None:
         raise UsageError(answer["refused"])
-    found: list[dict[str, Any]] = answer["gateways"]
-    return found
+    return {"gateways": answer["gateways"], "warning": answer["warning"]}
 
 
 def check_type(transport: Transport, domain: int, topic: str, type_name: str) -> None:

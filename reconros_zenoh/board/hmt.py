@@ -136,7 +136,7 @@ class HardwareTopic:
     that has to wait does not keep another from passing, or a gateway that is about to write could not go on
     to read. A publisher publishes one message at a time. A message takes its size through the stream's
     bandwidth; bodies, which must not change any more, are handed over by reference. `overhead_ns` is what a
-    subscribing slot needs to take a message over.
+    subscribing slot needs to take a message over. `has_callback` says that not only gateways have ends of it.
     """
 
     def __init__(self, board: Board, topic: str, message_type: MessageType) -> None:
@@ -155,6 +155,7 @@ class HardwareTopic:
         self._passages: Stream[Streamed] = Stream(self._pass, None)
         self._fifos: list[Fifo] = []
         self._tap: Stream[Parts] | None = None
+        self.has_callback = False
         self.passed = 0
         self.waits = 0
 
@@ -237,6 +238,7 @@ class HmtSource(Source):
 
     def __init__(self, board: Board, topic: HardwareTopic, plan: FifoPlan) -> None:
         super().__init__()
+        topic.has_callback = True
         self._board = board
         self._topic = topic
         self._fifo = Fifo(plan, self._arrived, None, cut_through=False)
@@ -280,6 +282,7 @@ class HmtWriter:
     in_slot = True
 
     def __init__(self, topic: HardwareTopic) -> None:
+        topic.has_callback = True
         self._topic = topic
 
     def message(self, **fields: object) -> Any:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+import sys
 from typing import Annotated, Any
 
 import typer
 
 from reconros_zenoh.cli.options import ENDPOINT, AsJson, Domain, Router
+from reconros_zenoh.cli.printable import printable
 from reconros_zenoh.errors import UsageError
 from reconros_zenoh.transport.zenoh import ZenohTransport
 
@@ -63,7 +65,7 @@ def gateway(
 
     A gateway connects a hardware-mapped and a software-mapped topic, and is loaded into a free slot. The QoS
     is that of its ends on the software-mapped topic. Exit status 2 when no slot is free, or one of the topics
-    has a gateway already or another type.
+    has a gateway already or another type; a hardware-mapped topic that no callback has is a warning.
     """
     from reconros_zenoh.board.gateway_control import ask_gateways, check_type
     from reconros_zenoh.project.type_names import inline_message_type
@@ -96,13 +98,15 @@ def gateway(
     with ZenohTransport.open(router) as transport:
         if add is not None:
             check_type(transport, domain, add["smt"], add["type"])
-        found = ask_gateways(transport, board, add)
+        answer = ask_gateways(transport, board, add)
     if as_json:
-        print(json.dumps({"board": board, "gateways": found}))
+        print(json.dumps({"board": board, **answer}))
         return
-    for each in found:
+    if answer["warning"]:
+        print(printable(f"warning: {answer['warning']}"), file=sys.stderr)
+    for each in answer["gateways"]:
         print(f"{each['name']}: {each['hmt']} <-> {each['smt']} ({each['type']}), slot {each['slot']}")
         print("  " + ", ".join(f"{policy} {word}" for policy, word in each["qos"].items()))
         print("  " + ", ".join(f"{count} {each[count]}" for count in _COUNTS))
-    if not found:
+    if not answer["gateways"]:
         print(f"board {board} has no gateway")

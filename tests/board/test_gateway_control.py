@@ -20,7 +20,7 @@ from reconros_zenoh.board.answers import VERSION
 from reconros_zenoh.board.control import gateways
 from reconros_zenoh.board.executor import Executor
 from reconros_zenoh.board.gateway_control import GatewayServer, check_type
-from reconros_zenoh.board.hmt import Fifo, FifoPlan
+from reconros_zenoh.board.hmt import Fifo, FifoPlan, HmtWriter
 from reconros_zenoh.board.spans import Timeline
 from reconros_zenoh.errors import UsageError
 from reconros_zenoh.executor.callbacks import CallbackKind
@@ -36,7 +36,7 @@ class Running:
     def __init__(self, slots: int = 2, static: Container[int] = ()) -> None:
         profile = small_profile({"a": (0, 100)}, topics={})
         self.board = small_board(profile, slots, static=static)
-        self.board.hardware_topic("/c", types().message("std_msgs/msg/UInt32"))
+        HmtWriter(self.board.hardware_topic("/c", types().message("std_msgs/msg/UInt32")))
         self.server = GatewayServer(self.board, types())
         self.client = desktop(self.board)
         self.querier = self.client.transport.request(f"reconros/{self.board.name}/gateway")
@@ -58,11 +58,24 @@ def request(**add: object) -> bytes:
 
 def test_a_gateway_is_added_and_listed() -> None:
     running = Running()
-    assert running.ask(request()) == {"version": VERSION, "gateways": [], "refused": None}
-    answer = running.ask(request(**ADD))
-    assert answer == {"version": VERSION, "gateways": gateways(running.board), "refused": None}
-    assert answer["gateways"][0]["hmt"] == "hmt/board0/a"
+    none = {"version": VERSION, "gateways": [], "refused": None, "warning": None}
+    assert running.ask(request()) == none
+    answer = running.ask(request(**{**ADD, "hmt": "/c", "smt": "/c"}))
+    assert answer == none | {"gateways": gateways(running.board)}
+    assert answer["gateways"][0]["hmt"] == "hmt/board0/c"
     assert running.ask(request()) == answer
+
+
+def test_a_stream_that_no_callback_has_is_warned_of() -> None:
+    running = Running()
+    nobody = "no callback of board 'board0' has a hardware-mapped end of {}. Its streams: /c."
+    for topic in "ab":
+        answer = running.ask(request(**{**ADD, "hmt": f"/{topic}", "smt": f"/{topic}"}))
+        assert (answer["refused"], answer["warning"]) == (None, nobody.format(f"/{topic}"))
+    answer = running.ask(request(**{**ADD, "hmt": "/typo", "smt": "/typo"}))
+    assert answer["refused"].startswith("board 'board0' has no slot for a gateway: ")
+    assert answer["refused"].endswith(f" Besides, {nobody.format('/typo')}")
+    assert not running.ask(request(**{**ADD, "hmt": "/c"}))["refused"].endswith("/c.")
 
 
 def test_a_gateway_is_added_with_its_qos() -> None:
@@ -104,7 +117,7 @@ def test_what_cannot_be_added_is_refused_and_changes_nothing(question: bytes, wo
     before = running.ask(request(**ADD))
     topics = list(running.board.hardware_topics)
     assert words in running.ask(question)["refused"]
-    assert running.ask(request()) == before
+    assert running.ask(request()) == before | {"warning": None}
     assert list(running.board.hardware_topics) == topics
 
 
