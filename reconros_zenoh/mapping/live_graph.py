@@ -46,9 +46,15 @@ def live_graph(tokens: Iterable[str], hardware: Collection[str]) -> ComputationG
             topic = ends.setdefault(token.name, {EndpointKind.PUBLISHER: {}, EndpointKind.SUBSCRIPTION: {}})
             topic[token.kind][_full_name(token.namespace, token.node)] = None
     silent = [name for name, topic in ends.items() if not topic[EndpointKind.PUBLISHER]]
+    in_network = {node for topic in ends.values() for nodes in topic.values() for node in nodes}
     notes = ["Services, actions and the topics that ROS 2 keeps for itself are left out."]
     if not hardware:
         notes.append("No token tells what is in hardware: name the nodes with --hardware.")
+    notes += [
+        f"{node} runs, but has no topic in the network: of streams inside an FPGA no token tells."
+        for node in wanted
+        if node not in in_network
+    ]
     if silent:
         notes.append(f"Left out because nobody publishes on them at the moment: {', '.join(silent)}.")
     return ComputationGraph(

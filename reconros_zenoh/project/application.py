@@ -293,6 +293,7 @@ class Application:
         )
 
     def _hardware_topic(self, resource: Resource) -> HardwareTopic:
+        self._node(_required(resource.node))  # of a stream nothing is in the network, but its node is
         return self.board.hardware_topic(
             endpoint_name(self.project.configuration.path, resource),
             self._type(resource, self.types.message),

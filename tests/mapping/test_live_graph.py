@@ -54,6 +54,14 @@ def test_nodes_and_topics_of_the_domain(network: SimulatedNetwork) -> None:
     assert "nobody publishes on them at the moment: /nobody." in graph.notes[-1]
 
 
+def test_a_node_of_streams_alone_is_in_hardware(network: SimulatedNetwork) -> None:
+    Context(network.transport("e5")).node("ground")
+    graph = read(network, "/ground", "/robot/edge")
+    assert graph.nodes["/ground"] is HW
+    (note,) = [note for note in graph.notes if "no topic in the network" in note]
+    assert note.startswith("/ground runs, but ")
+
+
 def test_without_a_node_in_hardware_it_says_how_to_name_them(network: SimulatedNetwork) -> None:
     graph = read(network)
     assert set(graph.nodes.values()) == {SW}

@@ -12,6 +12,7 @@ from reconros_zenoh.clock.virtual import VirtualEnvironment
 from reconros_zenoh.errors import UsageError
 from reconros_zenoh.project.loader import load_project
 from reconros_zenoh.project.mapping_file import Mapping
+from reconros_zenoh.ros.graph import NodeToken, parse
 from reconros_zenoh.ros.qos import QosProfile, Reliability
 from reconros_zenoh.transport.simulated import SimulatedNetwork
 
@@ -114,6 +115,14 @@ def test_endpoints_are_in_the_namespace_of_their_node(app: Application) -> None:
         assert any(f"/{name}/" in token for token in tokens)
     assert any("/%robot%arm%set_parameters/" in token for token in tokens)
     assert app.parameters("ros", "node").get("speed") == 1
+
+
+@pytest.mark.parametrize("end", ["stream_in", "stream_out"])
+def test_a_node_of_streams_alone_is_in_the_graph(app: Application, end: str) -> None:
+    (app.source if end == "stream_in" else app.writer)("ros", end)
+    (token,) = (parse(token) for token in app.board.context.transport.tokens("@ros2_lv/**", 0))
+    assert isinstance(token, NodeToken)
+    assert (token.namespace, token.node) == ("/robot", "arm")
 
 
 def test_the_qos_of_a_topic_is_chosen_that_of_others_is_fixed(app: Application) -> None:
