@@ -188,6 +188,13 @@ def read_project(folder: Path) -> ProjectFiles:
     """Return the files of the project in a folder; raise FileError for what is missing or wrong in them."""
     if folder.is_file():
         raise FileError(folder, None, "is a file.", "Give the folder of a project, where its build.cfg is.")
+    if not folder.exists():
+        raise FileError(
+            folder,
+            None,
+            "is not there.",
+            f"Give the folder of a project; relative paths, in a Compose file too, count from {Path.cwd()}.",
+        )
     configuration = read_build_cfg(folder / "build.cfg")
     check_topics(configuration)
     files = ProjectFiles(folder, configuration, read_interfaces(folder))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, field
+from difflib import get_close_matches
 from typing import TYPE_CHECKING, cast
 
 from reconros_zenoh.board.hmt import FIFO_DEPTH, FifoPlan
@@ -130,8 +131,10 @@ def _declaration(group: str, number: str | None, option: Option, warnings: list[
     written = re.split(r"[\s,]", value, maxsplit=1)[0]
     resource_type = _MISPRINTS.get(written, written)
     if resource_type not in _ARGUMENTS:
+        nearest = get_close_matches(written, _ARGUMENTS, 1)
         warning = (
-            f"{option.path}:{option.line}: {option.name} is no known resource and left out: {written!r}."
+            f"{option.path}:{option.line}: {option.name} is no known resource and left out: {written!r}. "
+            + (f"Did you mean {nearest[0]}?" if nearest else f"Known types: {', '.join(_ARGUMENTS)}.")
         )
         if warning not in warnings:
             warnings.append(warning)

@@ -96,6 +96,21 @@ def test_a_board_is_of_the_kind_that_its_project_is_built_for(tmp_path: Path) ->
     assert profiles == ["zcu104", "miniitx-zynq7100"]
 
 
+def test_a_relative_path_counts_from_the_current_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "elsewhere").mkdir()
+    (tmp_path / "echo").symlink_to(ECHO)
+    file = write_deployment(
+        tmp_path / "elsewhere", f"{BOARD} echo --profile=miniitx-zynq7100", "reconros client sort"
+    )
+    monkeypatch.chdir(tmp_path)
+    assert read_deployment(file, {}).boards["s0"].project.configuration.name == "echo"
+    monkeypatch.chdir(tmp_path / "elsewhere")
+    with pytest.raises(FileError, match=f"in a Compose file too, count from {tmp_path}/elsewhere"):
+        read_deployment(file, {})
+
+
 def test_a_robot_in_a_domain_without_a_board_is_refused(tmp_path: Path) -> None:
     file = write_deployment(tmp_path, BOARD, "reconros robot --domain=3")
     with pytest.raises(FileError, match=r"file\.yaml:5: .* asks in domain 3, where no board is"):

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
 
 from reconros_zenoh.errors import FileError
 from reconros_zenoh.project.build_cfg import read_build_cfg
+from reconros_zenoh.project.resource_groups import _ARGUMENTS, _HARDWARE_MAPPED
 from reconros_zenoh.project.type_names import inline_message_type, ros_type_name
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from reconros_zenoh.project.build_cfg import BuildConfiguration
 
 GROUP = '[General]\nName = x\n[ResourceGroup@g]\nnode = rosnode, "/n"\nmsg = rosmsg, std_msgs, msg, UInt32\n'
@@ -106,12 +107,25 @@ def test_a_mistake_is_reported_with_its_line(tmp_path: Path, resource: str, prob
     assert caught.value.remedy
 
 
-@pytest.mark.parametrize("resource", ["x = rosfoo, (a) b", "x ="])
+@pytest.mark.parametrize("resource", ["x = fifo, (a) b", "x ="])
 def test_an_unknown_type_is_left_out_with_a_warning(tmp_path: Path, resource: str) -> None:
     configuration = read(tmp_path, f"{GROUP}{resource}\n")
     assert "x" not in [found.name for found in configuration.resources]
     [warning] = configuration.warnings
     assert warning.startswith(f"{tmp_path}/build.cfg:6: x is no known resource")
+    assert warning.endswith(f". Known types: {', '.join(_ARGUMENTS)}.")
+
+
+def test_an_unknown_type_that_is_nearly_one_is_told_so(tmp_path: Path) -> None:
+    [warning] = read(tmp_path, f"{GROUP}x = rossubb, node, msg, /t\n").warnings
+    assert warning.endswith(" left out: 'rossubb'. Did you mean rossub?")
+
+
+def test_the_table_of_the_documentation_has_every_type() -> None:
+    page = (Path(__file__).parents[2] / "docs" / "porting.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| `([a-z]+(?:, [^`]+)?)` \|", page.replace("\\|", "|"), re.MULTILINE)
+    known = [*_ARGUMENTS.items(), *_HARDWARE_MAPPED.items()]
+    assert sorted(rows) == sorted(", ".join((name, *arguments)) for name, arguments in known)
 
 
 def test_a_reference_goes_to_the_one_group_that_declares_the_name_with_the_right_type(tmp_path: Path) -> None:
