@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.text import Text
 
-from reconros_zenoh.board.profile import read_profile
 from reconros_zenoh.cli.console import interrupted, titled_table, wide_console
-from reconros_zenoh.cli.options import AsJson, ModelSeed, project_prints
+from reconros_zenoh.cli.options import AsJson, ModelSeed, ProjectProfile, project_prints
 from reconros_zenoh.cli.progress import run_bar
-from reconros_zenoh.cli.run import _profile_of
 from reconros_zenoh.errors import UsageError
 from reconros_zenoh.experiments.comparison import MappingRun, outside_topics, run_mapping
 from reconros_zenoh.experiments.interruption import until_interrupted
@@ -23,6 +22,7 @@ from reconros_zenoh.measure.mapping_plots import ages_figure
 from reconros_zenoh.measure.plots import write_figure
 from reconros_zenoh.measure.statistics import format_ms, format_share
 from reconros_zenoh.project.loader import load_project
+from reconros_zenoh.project.main_file import load_main
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -64,10 +64,7 @@ def compare(
             show_default=f"{_SECONDS:g}; with a bag, its length",
         ),
     ] = None,
-    profile: Annotated[
-        str | None,
-        typer.Option(metavar="NAME|FILE", help="The kind of board.", show_default="that of TargetBoard"),
-    ] = None,
+    profile: ProjectProfile = None,
     seed: ModelSeed = 0,
     out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for records and drawing.")] = Path(
         "results/compare"
@@ -80,14 +77,16 @@ def compare(
     """
     with project_prints(as_json=as_json), own_folder(out):
         loaded = load_project(project)
-        model = read_profile(profile or _profile_of(loaded.configuration))
+        model = loaded.profile(profile)
         if model.model is None:
             raise UsageError(
                 f"profile {model.name!r} models nothing, so nothing would take any time. Choose a board that "
                 "does with --profile."
             )
         mappings = [loaded.mapping(name) for name in mapping or [*loaded.mapping_files()] or (None,)]
-        known = outside_topics(loaded.configuration, "rossub")
+        known, outputs = (
+            outside_topics(loaded.configuration, mappings[0], kind) for kind in ("rossub", "rospub")
+        )
         periodic = read_inputs(inputs or [], known, loaded.types())
         recorded, length_s = bag_topics(bag, known, loaded.types()) if bag else ({}, _SECONDS)
         heard = {topic: name for topic, name in known.items() if topic in periodic or topic in recorded}
@@ -98,9 +97,11 @@ def compare(
             until_interrupted() as interruption,
         ):
             for mapped in mappings:
-                # Read anew: what main.py and its modules remember belongs to one run.
-                again = load_project(project)
-                runs[mapped.name] = run_mapping(model, again, mapped, stimulus, seconds or length_s, seed)
+                # Anew: what main.py and its modules remember belongs to one run.
+                again = replace(loaded, main=load_main(project, loaded.configuration.name))
+                runs[mapped.name] = run_mapping(
+                    model, again, mapped, stimulus, outputs, seconds or length_s, seed
+                )
                 advance()
         experiment = {
             "experiment": "compare",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -66,7 +66,9 @@ class MappingRun:
                     writer.write(RoundTrip(index, age_ns, "ok"))
 
 
-def outside_topics(configuration: BuildConfiguration, kind: str) -> dict[str, str]:
+def outside_topics(
+    configuration: BuildConfiguration, mapping: CallbackMapping, kind: Literal["rossub", "rospub"]
+) -> dict[str, str]:
     """Return the topics, with their types, that a project has with the outside.
 
     `kind` is "rossub" for those that it hears, and "rospub" for those that it publishes.
@@ -74,12 +76,12 @@ def outside_topics(configuration: BuildConfiguration, kind: str) -> dict[str, st
     elsewhere = OUTSIDE["rospub" if kind == "rossub" else "rossub"]
     names = {
         topic.name
-        for topic in read_project_graph(configuration).topics
+        for topic in read_project_graph(configuration, mapping).topics
         if elsewhere in (*topic.publishers, *topic.subscribers)
     }
     return {
         end.topic: str(end.resource.interface)
-        for end in topic_ends(configuration)
+        for end in topic_ends(configuration, mapping)
         if end.resource.type == kind and end.topic in names
     }
 
@@ -89,15 +91,17 @@ def run_mapping(
     project: Project,
     mapping: CallbackMapping,
     stimulus: Stimulus,
+    outputs: Mapping[str, str],
     seconds: float,
     seed: int,
 ) -> MappingRun:
     """Return what the project has made of the stimulus in so many seconds of virtual time.
 
+    `outputs` names the type of each topic that is listened to.
+
     Raise UsageError when the board cannot host it. Ages are those of the last 10,000 messages of a topic.
     """
     types = project.types()
-    outputs = outside_topics(project.configuration, "rospub")
     with Simulation(types) as simulation:
         hosted = simulation.add_board(profile, project, mapping, BoardOptions(seed=seed))
         desktop = simulation.context().node("desktop")
