@@ -29,6 +29,9 @@ if TYPE_CHECKING:
 
     from rich.console import Console
 
+    from reconros_zenoh.project.loader import Project
+    from reconros_zenoh.project.mapping_file import Mapping as CallbackMapping
+
 _DRAWING = "compare.png"
 _SECONDS = 10.0
 
@@ -83,33 +86,33 @@ def compare(
                 f"profile {model.name!r} models nothing, so nothing would take any time. Choose a board that "
                 "does with --profile."
             )
-        mappings = [loaded.mapping(name) for name in mapping or [*loaded.mapping_files()] or (None,)]
-        known, outputs = (
-            outside_topics(loaded.configuration, mappings[0], kind) for kind in ("rossub", "rospub")
-        )
-        periodic = read_inputs(inputs or [], known, loaded.types())
+        mappings = _mappings(loaded, mapping)
+        first, *_ = mappings.values()
+        known, outputs = (outside_topics(loaded.configuration, first, kind) for kind in ("rossub", "rospub"))
+        messages = read_inputs(inputs or [], known, loaded.types())
         recorded, length_s = bag_topics(bag, known, loaded.types()) if bag else ({}, _SECONDS)
-        heard = {topic: name for topic, name in known.items() if topic in periodic or topic in recorded}
-        stimulus = Stimulus(heard, periodic, round(1e9 / rate), bag)
+        heard = {topic: name for topic, name in known.items() if topic in messages or topic in recorded}
+        stimulus = Stimulus(heard, messages, round(1e9 / rate), bag)
+        seconds = seconds or length_s
         runs: dict[str, MappingRun] = {}
         with (
             run_bar("compare", len(mappings), quiet=as_json, each="mappings") as advance,
             until_interrupted() as interruption,
         ):
-            for mapped in mappings:
+            for name, mapped in mappings.items():
                 # Anew: what main.py and its modules remember belongs to one run.
                 again = replace(loaded, main=load_main(project, loaded.configuration.name))
-                runs[mapped.name] = run_mapping(
-                    model, again, mapped, stimulus, outputs, seconds or length_s, seed
-                )
+                runs[name] = run_mapping(model, again, mapped, stimulus, outputs, seconds, seed)
                 advance()
         experiment = {
             "experiment": "compare",
             "project": loaded.configuration.name,
             "profile": model.name,
-            "seconds": seconds or length_s,
+            "seconds": seconds,
             "seed": seed,
             "inputs": heard,
+            "rate_hz": rate if messages else None,
+            "bag": str(bag) if bag else None,
             "silent": [topic for topic in known if topic not in heard],
             "mappings": {name: run.as_json() for name, run in runs.items()},
             "interrupted": interruption.happened,
@@ -126,6 +129,17 @@ def compare(
         print(f"records and experiment.json are in {out}" + (f"; drawn to {out / _DRAWING}" if drawn else ""))
     if interruption.happened:
         raise interrupted(quiet=as_json, measured=bool(runs))
+
+
+def _mappings(project: Project, given: list[str] | None) -> dict[str, CallbackMapping]:
+    """Return the mappings that are asked for by name; raise UsageError for two of one name."""
+    mappings: dict[str, CallbackMapping] = {}
+    for name in given or [*project.mapping_files()] or (None,):
+        mapping = project.mapping(name)
+        if mapping.name in mappings:
+            raise UsageError(f"two mappings are named {mapping.name!r}. Rename one of the files.")
+        mappings[mapping.name] = mapping
+    return mappings
 
 
 def _draw(path: Path, runs: Mapping[str, MappingRun]) -> bool:

@@ -64,7 +64,7 @@ def test_all_mappings_have_the_same_to_do(tmp_path: Path) -> None:
     assert list(told["mappings"]) == MAPPINGS
     assert told["inputs"] == {"/angle": WORD}
     assert told["silent"] == ["/image_classification", "/image_raw"]
-    assert (told["seconds"], told["interrupted"]) == (0.5, False)
+    assert (told["seconds"], told["rate_hz"], told["bag"], told["interrupted"]) == (0.5, 100, None, False)
     for measured in told["mappings"].values():
         output = measured["outputs"]["/legangle"]
         assert output["sent"] + measured["dropped"] == pytest.approx(50, abs=3)  # the last are on their way
@@ -157,6 +157,7 @@ def test_where_nothing_leaves_the_board_nothing_is_drawn(tmp_path: Path) -> None
         (["--input", "/angle={date: 80}"], "has no field 'date'"),
         (["--bag", "nowhere"], "nowhere cannot be read as a rosbag2 recording"),
         (["--mapping", "mixt"], "no mapping named 'mixt'"),
+        (["--mapping", "mixed", "--mapping", "mixed"], "two mappings are named 'mixed'"),
         (["--profile", "native"], "profile 'native' models nothing"),
     ],
 )
