@@ -12,6 +12,7 @@ from reconros_zenoh.board.spans import Timeline
 from reconros_zenoh.board.stream import Stream
 from reconros_zenoh.errors import TransportError
 from reconros_zenoh.rmw.received import Received
+from reconros_zenoh.ros.names import resolve
 from reconros_zenoh.ros.qos import QosProfile
 
 if TYPE_CHECKING:
@@ -43,13 +44,14 @@ class StackNode:
     """A node's ends on a board: like those of `Node`, but each message costs what the stack takes.
 
     Sinks are called by the event loop; what sends may be called from any thread. What is sent is counted in
-    the board's spans under `label`.
+    the board's spans under the absolute name of `whole`, what the ends belong to: an action, or `~`, the node
+    itself. Callbacks have no such names.
     """
 
-    def __init__(self, board: Board, node: Node, label: str) -> None:
+    def __init__(self, board: Board, node: Node, whole: str) -> None:
         self._board = board
         self._node = node
-        self._label = label
+        self._label = resolve(whole, node.namespace, node.name)
 
     @property
     def context(self) -> Context:

@@ -161,7 +161,7 @@ class Application:
 
         def serve(resource: Resource) -> Parameters:
             node = self._node(_required(resource.ros_name))
-            return Parameters(StackNode(self.board, node, node.name), self.types)
+            return Parameters(StackNode(self.board, node, "~"), self.types)
 
         return self._shared(group, name, "rosnode", serve)
 

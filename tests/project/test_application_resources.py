@@ -13,6 +13,9 @@ from reconros_zenoh.errors import UsageError
 from reconros_zenoh.project.loader import load_project
 from reconros_zenoh.project.mapping_file import Mapping
 from reconros_zenoh.ros.graph import NodeToken, parse
+
+
+from reconros_zenoh.rmw.action_client import ActionClient
 from reconros_zenoh.ros.qos import QosProfile, Reliability
 from reconros_zenoh.transport.simulated import SimulatedNetwork
 
@@ -20,6 +23,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from reconros_zenoh.project.application import Application
+    from reconros_zenoh.ros.types import ActionType
 
 BUILD_CFG = """
 [General]
@@ -123,6 +127,24 @@ def test_a_node_of_streams_alone_is_in_the_graph(app: Application, end: str) -> 
     (token,) = (parse(token) for token in app.board.context.transport.tokens("@ros2_lv/**", 0))
     assert isinstance(token, NodeToken)
     assert (token.namespace, token.node) == ("/robot", "arm")
+
+
+def test_what_a_node_sends_for_its_parameters_and_actions_is_no_message_of_a_callback(
+    app: Application,
+) -> None:
+    app.parameters("ros", "node").declare("speed", 1)
+    app.board.environment.run(until=1)
+    assert app.board.spans.mean_ms().keys() == {"/robot/arm"}
+    app.source("ros", "act").open(lambda: None, None)
+    client = ActionClient(app.board.context.node("other"), _fibonacci(app), "/robot/serve", lambda _: None)
+    app.board.environment.run(until=2)
+    client.send_goal(_fibonacci(app).goal.cls(order=1), client.new_goal_id())
+    app.board.environment.run(until=3)
+    assert app.board.spans.mean_ms().keys() == {"/robot/arm", "/robot/serve"}
+
+
+def _fibonacci(app: Application) -> ActionType:
+    return app.types.action("example_interfaces/action/Fibonacci")
 
 
 def test_the_qos_of_a_topic_is_chosen_that_of_others_is_fixed(app: Application) -> None:

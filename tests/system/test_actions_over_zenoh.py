@@ -57,7 +57,7 @@ def desktop(endpoint: str, types: TypeRegistry) -> Iterator[Transport]:
         executor = Executor(board, 1, 0)
         executor.add_sw_callback("serve", CallbackKind.SRV, source, serve)
         executor.spin()
-        Parameters(StackNode(board, node, "server"), types).declare("speed", 3)
+        Parameters(StackNode(board, node, "~"), types).declare("speed", 3)
         loop = threading.Thread(target=environment.run, args=(stop,))
         loop.start()
         yield here
