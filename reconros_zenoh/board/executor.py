@@ -210,6 +210,7 @@ class Executor:
     def complete(self, dispatch: Dispatch, event: Event, response: object) -> None:
         """Note that the callback has run to completion and pass on what it returned."""
         self._registrations[dispatch.entry.name].source.answer(event, response)
+        self.board.spans.end(event.timeline)
         self._finish(dispatch)
 
     def fail(self, dispatch: Dispatch, event: Event, error: BaseException) -> None:

@@ -55,6 +55,7 @@ class Gateway:
         )
         self._hmt = Fifo(FifoPlan(), self._wake, PublisherFilter(self), cut_through=True)
         self.name = node.name
+        self._label = node.fully_qualified_name
         self.pair = Pair(topic.key, self._writer.topic)
         self.type = topic.type.name
         self.qos = qos
@@ -120,9 +121,11 @@ class Gateway:
         if self._smt_last:
             return core.Responded(self._smt.take())
         streamed = self._hmt.take()
-        return core.Arrived(streamed._replace(timeline=streamed.timeline.fork()))
+        streamed.timeline.callback = self._label
+        return core.Arrived(streamed)
 
     def _write_hmt(self, event: Event) -> Generator[Awaitable, object, None]:
+        event.timeline.callback = self._label
         event.timeline.mark("gateway")
         sender = event.publisher.hex()
         read = Signal()

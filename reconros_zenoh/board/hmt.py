@@ -54,6 +54,7 @@ class FifoPlan:
 class Streamed(NamedTuple):
     """A message on its way over a stream; `complete` fires when its last word is there.
 
+    `timeline` is the publisher's; of a message in a FIFO it is the reader's, which begins with `complete`.
     `read` fires when its last word has come from where it is read; None where all is there from the start.
     `publisher` wrote it to the stream, for the filters; `sender` sent it first, for the log: the gid in
     hexadecimal of who published it in software, or the name of the hardware callback.
@@ -189,7 +190,7 @@ class HardwareTopic:
     ) -> Generator[Awaitable, object, None]:
         """Return when the message of `size` bytes on the wire has passed; the others as in `Streamed`.
 
-        Raise BadMessageError when it is larger than somebody's FIFO.
+        It is counted with its timeline. Raise BadMessageError when it is larger than somebody's FIFO.
         """
         for fifo in self._fifos:
             if fifo.plan.message_bytes is not None and size > fifo.plan.message_bytes:
@@ -207,24 +208,29 @@ class HardwareTopic:
         streamed = Streamed(publisher, message, size, targets, timeline, Signal(), sender, read)
         self._passages.put(streamed)
         yield streamed.complete
+        timeline.mark("hmt")
+        self._board.spans.add(timeline)
         if self._tap is not None:
             self._tap.put(self.type.encode(message))
 
     def _pass(self, streamed: Streamed) -> Generator[Awaitable, object, None]:
         self.passed += 1
-        for fifo in streamed.targets:
+        theirs = [(fifo, streamed._replace(timeline=streamed.timeline.follow())) for fifo in streamed.targets]
+        for fifo, message in theirs:
             if fifo.cut_through:
-                fifo.append(streamed)
+                fifo.append(message)
         duration_ns = round(streamed.size * self._ns_per_byte)
         if duration_ns:
             yield self._board.environment.timeout(duration_ns)
         if streamed.read is not None:
             yield streamed.read
+        for _, message in theirs:
+            message.timeline.begin()
         # First whoever has waited for the last word: a gateway has a longer way to go than the others.
         streamed.complete.fire()
-        for fifo in streamed.targets:
+        for fifo, message in theirs:
             if not fifo.cut_through:
-                self._hand_over(fifo, streamed)
+                self._hand_over(fifo, message)
 
     def _hand_over(self, fifo: Fifo, streamed: Streamed) -> None:
         if self._overhead_ns:
@@ -260,9 +266,8 @@ class HmtSource(Source):
     def take(self) -> Event:
         """Remove the oldest message and return it, as it lies in the slot."""
         streamed = self._fifo.take()
-        timeline = streamed.timeline.fork()
-        timeline.mark("hmt")
-        return Event(streamed.message, timeline, message_type=self._topic.type, in_slot=True)
+        streamed.timeline.mark("hmt")
+        return Event(streamed.message, streamed.timeline, message_type=self._topic.type, in_slot=True)
 
     def _arrived(self) -> None:
         try:
@@ -305,5 +310,4 @@ class HmtWriter:
         """
         size = sum(map(len, self._topic.type.encode(message, joined_at_once=True)))
         message = snapshot(message)
-        yield from self._topic.publish(self, message, size, timeline.fork(), timeline.callback)
-        timeline.mark("hmt")
+        yield from self._topic.publish(self, message, size, timeline, timeline.callback)

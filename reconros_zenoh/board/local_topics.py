@@ -109,12 +109,12 @@ class LocalTopics:
         # What is left of waking the hardware readers is their delegates' work, not the publisher's.
         rest_ns = woken * max(0, self._notify_ns - notify_ns)
         for reader in readers:
-            fork = timeline.fork()
+            theirs = timeline.follow()
             if reader.in_hardware:
-                way = self._wait(rest_ns, fork)
+                way = self._wait(rest_ns, theirs)
             else:
-                way = self._way_to_software(publication, woken, fork)
-            reader.deliver(received, fork, way)
+                way = self._way_to_software(publication, woken, theirs)
+            reader.deliver(received, theirs, way)
 
     def close(self) -> None:
         """Look at the graph no longer."""
@@ -180,6 +180,7 @@ class LocalTopicWriter(TopicWriter):
     ) -> None:
         qos = qos or QosProfile()
         super().__init__(board, node, message_type, topic, qos)
+        self._board = board
         self._topics = topics
         self._in_place = in_place
         # The transport keeps what is sent for those who come late elsewhere.
@@ -217,3 +218,5 @@ class LocalTopicWriter(TopicWriter):
         self.kept.append(publication)
         if self._is_kept or self._topics.is_read_elsewhere(self.key):
             super().send(sent.parts, sent.timeline)
+        else:
+            self._board.spans.add(sent.timeline)

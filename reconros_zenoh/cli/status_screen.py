@@ -48,7 +48,7 @@ def print_status(console: Console, status: Mapping[str, Any]) -> None:
             for slot in status["slots"]
         ),
     )
-    _print_spans(console, status["spans_ms"])
+    _print_spans(console, status["spans_ms"], status["end_to_end_ms"])
     _print(
         console,
         ("publishes", "sent", "dropped", "age [ms]: median", "p95", "max"),
@@ -74,20 +74,24 @@ def print_status(console: Console, status: Mapping[str, Any]) -> None:
     _print_host(console, status["host"])
 
 
-def _print_spans(console: Console, spans_ms: Mapping[str, Mapping[str, float]]) -> None:
-    """Print where the time of a message goes, in the order of its way: a column for each callback."""
-    names = list(spans_ms)
-    for first in range(0, len(names), _CALLBACKS_PER_TABLE):
-        shown = [spans_ms[name] for name in names[first : first + _CALLBACKS_PER_TABLE]]
+def _print_spans(
+    console: Console, spans_ms: Mapping[str, Mapping[str, float]], end_to_end_ms: Mapping[str, float]
+) -> None:
+    """Print where the time of a message goes, in the order of its way: a column for each callback.
+
+    The last row stands where messages had come through other callbacks of the board before.
+    """
+    callbacks = list(spans_ms)
+    for first in range(0, len(callbacks), _CALLBACKS_PER_TABLE):
+        names = callbacks[first : first + _CALLBACKS_PER_TABLE]
+        shown = [spans_ms[name] for name in names]
         stages = [stage for stage in get_args(Stage) if any(stage in each for each in shown)]
-        _print(
-            console,
-            ("mean [ms]", *names[first : first + _CALLBACKS_PER_TABLE]),
-            (
-                *((stage, *(each.get(stage, 0.0) for each in shown)) for stage in stages),
-                ("sum", *(sum(each.values()) for each in shown)),
-            ),
-        )
+        sums = [sum(each.values()) for each in shown]
+        rows = [[stage, *(each.get(stage, 0.0) for each in shown)] for stage in stages]
+        rows.append(["sum", *sums])
+        if any(_ms(end_to_end_ms.get(name, own)) != _ms(own) for name, own in zip(names, sums, strict=True)):
+            rows.append(["end to end", *(end_to_end_ms.get(name, "-") for name in names)])
+        _print(console, ("mean [ms]", *names), rows)
 
 
 def _print_host(console: Console, host: Mapping[str, Any]) -> None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
-from small_board import desktop, small_board, small_profile, stages, start, types
+from small_board import desktop, small_board, small_profile, start, types
 
 from reconros_zenoh.board.control import gateways
 from reconros_zenoh.board.endpoints import SubscriptionSource
@@ -69,12 +69,10 @@ class Side:
             self._listen(heard)
         self.software: list[tuple[int, Any]] = []
         source = SubscriptionSource(board, self.node, words, "/a")
-        self.ways: list[dict[str, int]] = []
 
         def note() -> None:
             event = source.take()
             self.software.append((self.environment.now, event.message))
-            self.ways.append(stages(event.timeline))
 
         source.open(note, None)
         self.writer = board.writer(self.node, words, "/a")
@@ -114,7 +112,11 @@ def test_from_hardware_a_message_is_streamed_to_all_and_written_to_memory_once(s
     side.environment.run()
     assert [times_of(heard, body) for heard in side.hardware] == [[U + G]] * subscribers
     assert times_of(side.software, body) == [U + C + A + D]
-    assert side.ways == [{"hmt": U, "gateway": C, "dds": A + D}]
+    parts_ns = {
+        name: {stage: ms * 1e6 for stage, ms in stages_ms.items() if ms}
+        for name, stages_ms in side.board.spans.mean_ms().items()
+    }
+    assert parts_ns == {"": {"hmt": U}, "/bridge": {"gateway": C, "dds": A + D}}
     assert side.board.memif.transferred_bytes == U
 
 
