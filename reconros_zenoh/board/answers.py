@@ -20,6 +20,12 @@ class _Timing(_Part):
     basis: _Text
 
 
+class _Call(_Part):
+    slot: int | None
+    since_ms: float
+    waits_for: _Text | None
+
+
 class _Callback(_Part):
     kind: _Text
     software: bool
@@ -28,6 +34,7 @@ class _Callback(_Part):
     calls: int
     failed: int
     dropped: int
+    running: list[_Call]
 
 
 class _Slot(_Part):
@@ -35,7 +42,15 @@ class _Slot(_Part):
     holds: _Text | None
     reconfigurations: int
     reconfiguration_ms: float
+    icap_wait_ms: float
     busy_ms: float
+
+
+class _Use(_Part):
+    cores: float
+    icap: float
+    memif: float
+    stack: float
 
 
 class _Publisher(_Part):
@@ -81,8 +96,10 @@ class StatusAnswer(_Part):
     profile: _Text
     domain: int
     executor: _Text
+    elapsed_ms: float
     callbacks: dict[_Text, _Callback]
     slots: list[_Slot]
+    use: _Use | None
     publishers: dict[_Text, _Publisher]
     gateways: list[_Gateway]
     hmt: dict[_Text, _Stream]

@@ -78,6 +78,7 @@ class Board:
         """
         model = profile.model
         self.environment = environment
+        self.started_ns = environment.now
         self.context = context
         self.profile = profile
         self.name = name
@@ -100,10 +101,11 @@ class Board:
         self._tap = tap
         self.slots: Mapping[int, Slot] = {
             plan.slot_id: Slot(
+                environment,
                 plan.slot_id,
                 profile.bitstream_size(plan.lut, plan.dsp, plan.bram36),
                 plan.clock_hz or (model.fabric.thread_clock.hz if model else _ANY_CLOCK_HZ),
-                plan.reconfigurable,
+                reconfigurable=plan.reconfigurable,
             )
             for plan in slots
         }

@@ -99,7 +99,7 @@ def status(board: Board, executor: Executor) -> dict[str, Any]:
     """Return what the board is and what it has done so far; called by the thread of its event loop.
 
     `host` says how well this host kept up: results later than the model had them ready (`overruns`) and how
-    late the event loop was (`lag_*`, wall time only).
+    late the event loop was (`lag_*`, wall time only). All times are since the board was made.
     """
     overruns = board.host.overruns
     lag = board.environment.lag() if isinstance(board.environment, WallEnvironment) else None
@@ -109,17 +109,20 @@ def status(board: Board, executor: Executor) -> dict[str, Any]:
         "profile": board.profile.name,
         "domain": board.context.domain,
         "executor": executor.kind,
+        "elapsed_ms": (board.environment.now - board.started_ns) / 1e6,
         "callbacks": executor.statistics(),
         "slots": [
             {
                 "id": slot.slot_id,
                 "holds": slot.holds.callback if slot.holds else None,
                 "reconfigurations": slot.reconfigurations,
-                "reconfiguration_ms": slot.reconfiguration_ns / 1e6,
-                "busy_ms": slot.busy_ns / 1e6,
+                "reconfiguration_ms": slot.reconfiguring.ns / 1e6,
+                "icap_wait_ms": slot.waiting.ns / 1e6,
+                "busy_ms": slot.busy.ns / 1e6,
             }
             for slot in board.slots.values()
         ],
+        "use": use(board),
         "publishers": _publishers(board.writers),
         "gateways": gateways(board),
         "hmt": {
@@ -135,6 +138,23 @@ def status(board: Board, executor: Executor) -> dict[str, Any]:
             "lag_p50_us": lag.p50_us if lag else None,
             "lag_p99_us": lag.p99_us if lag else None,
         },
+    }
+
+
+def use(board: Board) -> dict[str, float] | None:
+    """Return for which share of its time each shared part of a board was busy, None where none is modelled.
+
+    Of the cores the share of all together; the stack is busy with a message until that is through, what it
+    waits for cores included.
+    """
+    elapsed_ns = board.environment.now - board.started_ns
+    if board.profile.model is None or not elapsed_ns:
+        return None
+    return {
+        "cores": board.cpu.cores.use(elapsed_ns),
+        "icap": sum(slot.reconfiguring.ns for slot in board.slots.values()) / elapsed_ns,
+        "memif": board.memif.bus.use(elapsed_ns),
+        "stack": board.dds.busy.ns / elapsed_ns,
     }
 
 

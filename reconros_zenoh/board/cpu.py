@@ -21,25 +21,25 @@ class Cpu:
     """
 
     def __init__(self, environment: VirtualEnvironment, cores: int) -> None:
-        self._cores = SharedResource(environment, capacity=cores, per_job=1)
+        self.cores = SharedResource(environment, capacity=cores, per_job=1)
 
     def run(self, core_time_ns: float) -> Generator[Awaitable, object, None]:
         """Return when a thread has had `core_time_ns` on the cores."""
-        return self._cores.serve(core_time_ns)
+        return self.cores.serve(core_time_ns)
 
     def run_stack(self, core_time_ns: float, share: float) -> Generator[Awaitable, object, None]:
         """Return when the stack has had `core_time_ns`, of one core at most `share` at a time."""
-        return self._cores.serve(core_time_ns, share, first=True)
+        return self.cores.serve(core_time_ns, share, first=True)
 
     @property
     def is_busy(self) -> bool:
         """Whether other threads keep every core busy, or the stack is stalled."""
-        return self._cores.is_saturated
+        return self.cores.is_saturated
 
     def stall_stack(self) -> None:
         """Keep the communication stack from running until `resume_stack`."""
-        self._cores.hold_first()
+        self.cores.hold_first()
 
     def resume_stack(self) -> None:
         """Take back one `stall_stack`."""
-        self._cores.release_first()
+        self.cores.release_first()

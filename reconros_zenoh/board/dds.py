@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, NamedTuple
 
+from reconros_zenoh.board.busy_time import BusyTime
 from reconros_zenoh.board.stream import Stream
 from reconros_zenoh.clock.activity import Signal
 
@@ -52,6 +53,7 @@ class DdsStack:
         self._cpu = cpu
         self._randomness = randomness
         self._modelled = model is not None
+        self.busy = BusyTime(environment)
         # How long small and large messages lately were on their way in the real network; nothing in virtual
         # time.
         self._transit_ns = {False: 0.0, True: 0.0}
@@ -124,7 +126,9 @@ class DdsStack:
         yield passage.done
 
     def _pass(self, passage: _Passage) -> Generator[Awaitable, object, None]:
+        self.busy.begin()
         yield from self._cpu.run_stack(passage.duration_ns * self._core_share, self._core_share)
+        self.busy.end()
         passage.done.fire()
 
     def _repair(

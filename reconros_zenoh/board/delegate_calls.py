@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 if TYPE_CHECKING:
     from collections.abc import Generator
@@ -11,6 +11,8 @@ if TYPE_CHECKING:
     from reconros_zenoh.board.osif import Osif
     from reconros_zenoh.board.spans import Timeline
     from reconros_zenoh.clock.activity import Awaitable
+
+R = TypeVar("R")
 
 
 class DelegateCalls:
@@ -27,15 +29,12 @@ class DelegateCalls:
     def mbox_get(self, mailbox: Mailbox) -> Generator[Awaitable, object, int]:
         """Remove the oldest word, once there is one, and return it: MBOX_GET."""
         yield from self._call()
-        word = yield from mailbox.get()
-        self._timeline.mark("blocked")
-        return word
+        return (yield from self._blocked("a word in a mailbox", mailbox.get()))
 
     def mbox_put(self, mailbox: Mailbox, word: int) -> Generator[Awaitable, object, None]:
         """Append a word once there is room: MBOX_PUT."""
         yield from self._call()
-        yield from mailbox.put(word)
-        self._timeline.mark("blocked")
+        yield from self._blocked("room in a mailbox", mailbox.put(word))
 
     def mbox_tryget(self, mailbox: Mailbox) -> Generator[Awaitable, object, int | None]:
         """Remove the oldest word and return it, or None: MBOX_TRYGET."""
@@ -51,8 +50,7 @@ class DelegateCalls:
         """Hold the mutex once nobody else does: MUTEX_LOCK."""
         yield from self._call()
         self._mutexes[mutex] = None
-        yield from mutex.lock(self)
-        self._timeline.mark("blocked")
+        yield from self._blocked("a mutex", mutex.lock(self))
 
     def mutex_trylock(self, mutex: Mutex) -> Generator[Awaitable, object, bool]:
         """Hold the mutex and return True, or return False: MUTEX_TRYLOCK."""
@@ -68,8 +66,7 @@ class DelegateCalls:
     def cond_wait(self, condition: Condition) -> Generator[Awaitable, object, None]:
         """Let others have the mutex, wait for a signal, and hold the mutex again: COND_WAIT."""
         yield from self._call()
-        yield from condition.wait(self)
-        self._timeline.mark("blocked")
+        yield from self._blocked("a condition", condition.wait(self))
 
     def cond_signal(self, condition: Condition) -> Generator[Awaitable, object, None]:
         """Let one that waits go on: COND_SIGNAL."""
@@ -84,8 +81,7 @@ class DelegateCalls:
     def sem_wait(self, semaphore: Semaphore) -> Generator[Awaitable, object, None]:
         """Count down once the semaphore is above 0: SEM_WAIT."""
         yield from self._call()
-        yield from semaphore.wait()
-        self._timeline.mark("blocked")
+        yield from self._blocked("a semaphore", semaphore.wait())
 
     def sem_post(self, semaphore: Semaphore) -> Generator[Awaitable, object, None]:
         """Count up: SEM_POST."""
@@ -96,6 +92,13 @@ class DelegateCalls:
         """Let others have every mutex that is still held: the call has ended, maybe with an error."""
         for mutex in self._mutexes:
             mutex.release(self)
+
+    def _blocked(self, what: str, wait: Generator[Awaitable, object, R]) -> Generator[Awaitable, object, R]:
+        self._timeline.waits_for = what
+        result = yield from wait
+        self._timeline.waits_for = ""
+        self._timeline.mark("blocked")
+        return result
 
     def _call(self) -> Generator[Awaitable, object, None]:
         yield from self._osif.call()

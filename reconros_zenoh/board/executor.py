@@ -20,7 +20,7 @@ from reconros_zenoh.board.workers import HardwareWorker, SoftwareWorker
 from reconros_zenoh.errors import BadMessageError, UsageError
 from reconros_zenoh.executor.callbacks import CallbackEntry, CallbackKind
 from reconros_zenoh.executor.reconros import ReconrosExecutor
-from reconros_zenoh.executor.resource_mask import ResourceMask
+from reconros_zenoh.executor.resource_mask import SOFTWARE, ResourceMask
 from reconros_zenoh.executor.standard import StandardExecutor
 
 if TYPE_CHECKING:
@@ -94,6 +94,7 @@ class Executor:
         self._policy = StandardExecutor() if kind == "standard" else ReconrosExecutor()
         self._registrations: dict[str, _Registration] = {}
         self._is_spinning = False
+        self._workers: list[Worker] = []
         self._workers_of: dict[str, list[Worker]] = {}
         model = board.profile.model
         self._poll_jitter = model.executor.poll_jitter.share if model else 0.0
@@ -190,12 +191,12 @@ class Executor:
         model = board.profile.model
         software_poll_ns = model.executor.software_poll.ns if model and self.kind == "reconros" else 0
         hardware_poll_ns = model.executor.hardware_poll.ns if model else 0
-        workers: list[Worker] = [
-            SoftwareWorker(self, software_poll_ns) for _ in range(self._software_workers)
-        ]
-        workers += [HardwareWorker(self, slot, hardware_poll_ns) for slot in self._slots]
+        self._workers += [SoftwareWorker(self, software_poll_ns) for _ in range(self._software_workers)]
+        self._workers += [HardwareWorker(self, slot, hardware_poll_ns) for slot in self._slots]
         for entry in self._policy:
-            self._workers_of[entry.name] = [worker for worker in workers if worker.resource in entry.mask]
+            self._workers_of[entry.name] = [
+                worker for worker in self._workers if worker.resource in entry.mask
+            ]
             registration = self._registrations[entry.name]
             check = registration.check and partial(_check_message, entry.name, registration.check)
             registration.source.open(partial(self._became_ready, entry), check)
@@ -234,7 +235,11 @@ class Executor:
         self._finish(dispatch)
 
     def statistics(self) -> dict[str, dict[str, object]]:
-        """Return where each callback may run, how often it was called and failed, and what was dropped."""
+        """Return where each callback may run, how often it was called and failed, and what was dropped.
+
+        `running` are its calls that have not ended: where, since when on the clock of the board, and what a
+        call waits for that others have to provide, None for nothing.
+        """
         return {
             name: {
                 "kind": registration.kind.name,
@@ -244,6 +249,15 @@ class Executor:
                 "calls": self.calls[name],
                 "failed": self.failures[name],
                 "dropped": registration.source.dropped,
+                "running": [
+                    {
+                        "slot": None if worker.resource == SOFTWARE else worker.resource,
+                        "since_ms": (worker.since_ns - self.board.started_ns) / 1e6,
+                        "waits_for": worker.serves.waits_for or None,
+                    }
+                    for worker in self._workers
+                    if worker.serves is not None and worker.serves.callback == name
+                ],
             }
             for name, registration in self._registrations.items()
         }

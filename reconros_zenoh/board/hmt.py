@@ -149,6 +149,7 @@ class HardwareTopic:
             )
         section = model.hmt if model else None
         self.key = hmt_key(board.name, topic)
+        self._room = f"room in {topic}"
         self.type = message_type
         self._board = board
         self._overhead_ns = section.overhead.ns if section else 0
@@ -202,7 +203,9 @@ class HardwareTopic:
         fifos = [fifo for fifo in self._fifos if fifo.own is None or fifo.own.passes(publisher)]
         self.waits += any(fifo.blocks for fifo in fifos)
         while full := next((fifo for fifo in fifos if fifo.blocks), None):
+            timeline.waits_for = self._room
             yield full.room
+        timeline.waits_for = ""
         # All places at once: who held one while waiting for another could keep a third from going on.
         targets = [fifo for fifo in fifos if fifo.reserve()]
         streamed = Streamed(publisher, message, size, targets, timeline, Signal(), sender, read)

@@ -23,10 +23,10 @@ class Memif:
     def __init__(self, environment: VirtualEnvironment, bytes_per_ns: float | None) -> None:
         self._modelled = bytes_per_ns is not None
         bandwidth = bytes_per_ns or 1
-        self._bus = SharedResource(environment, capacity=bandwidth, per_job=bandwidth)
+        self.bus = SharedResource(environment, capacity=bandwidth, per_job=bandwidth)
         self.transferred_bytes = 0
 
     def transfer(self, size: int) -> Generator[Awaitable, object, None]:
         """Return when `size` bytes have gone from or to the main memory."""
         self.transferred_bytes += size
-        return self._bus.serve(size if self._modelled else 0)
+        return self.bus.serve(size if self._modelled else 0)

@@ -53,6 +53,7 @@ class SharedResource:
         self._capacity = capacity
         self._per_job = min(per_job, capacity)
         self._jobs: list[_Job] = []
+        self._asked = 0.0
         self._holds = 0
         self._contended = False  # else every job has all that it can use
 
@@ -65,6 +66,7 @@ class SharedResource:
         """
         if work <= 0:
             return
+        self._asked += work
         job = _Job(work, self._environment.now, self._per_job if limit is None else limit, first=first)
         self._jobs.append(job)
         if self._contended or self._demand() > self._capacity:
@@ -74,10 +76,16 @@ class SharedResource:
         try:
             yield job
         except BaseException:  # the caller is stopped, or closed
+            self._asked -= self._left(job)
             job.due_ns = None
             self._jobs.remove(job)
             self._share()
             raise
+
+    def use(self, duration_ns: int) -> float:
+        """Return the share of what could have been done in so long that has been done since the start."""
+        done = self._asked - sum(map(self._left, self._jobs))
+        return done / (self._capacity * duration_ns)
 
     @property
     def is_saturated(self) -> bool:
@@ -93,6 +101,9 @@ class SharedResource:
         """Take back one `hold_first`."""
         self._holds -= 1
         self._share()
+
+    def _left(self, job: _Job) -> float:
+        return max(0.0, job.remaining - job.rate * (self._environment.now - job.since_ns))
 
     def _demand(self) -> float:
         demand = 0.0

@@ -2,30 +2,45 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 from reconros_zenoh.board.bitstream import Bitstream
+from reconros_zenoh.board.busy_time import BusyTime
 from reconros_zenoh.errors import UsageError
 
+if TYPE_CHECKING:
+    from reconros_zenoh.clock.virtual import VirtualEnvironment
 
-@dataclass(slots=True)
+
 class Slot:
     """A region of the FPGA that holds one hardware thread or gateway at a time (RS #x); empty at power-up.
 
     `tenants` are the names of all that may be in it; one that must never be swapped out is there alone. A
-    slot that is not `reconfigurable` has one tenant and holds it from power-up on.
+    slot that is not `reconfigurable` has one tenant and holds it from power-up on. It is `busy` from when its
+    bitstream is there until the call ends, waits of the callback included; `reconfiguring` while the ICAP
+    writes to it, and `waiting` until the ICAP does.
     """
 
-    slot_id: int
-    bitstream_size: int
-    clock_hz: float
-    reconfigurable: bool
-    holds: Bitstream | None = field(default=None, init=False)
-    tenants: set[str] = field(default_factory=set, init=False)
-    is_given_away: bool = field(default=False, init=False)
-    reconfigurations: int = field(default=0, init=False)
-    reconfiguration_ns: int = field(default=0, init=False)
-    busy_ns: int = field(default=0, init=False)
+    def __init__(
+        self,
+        environment: VirtualEnvironment,
+        slot_id: int,
+        bitstream_size: int,
+        clock_hz: float,
+        *,
+        reconfigurable: bool,
+    ) -> None:
+        self.slot_id = slot_id
+        self.bitstream_size = bitstream_size
+        self.clock_hz = clock_hz
+        self.reconfigurable = reconfigurable
+        self.holds: Bitstream | None = None
+        self.tenants: set[str] = set()
+        self.is_given_away = False
+        self.reconfigurations = 0
+        self.busy = BusyTime(environment)
+        self.reconfiguring = BusyTime(environment)
+        self.waiting = BusyTime(environment)
 
     def admit(self, name: str, *, alone: bool = False) -> Bitstream:
         """Let this hardware thread or gateway be in the slot, and return the bitstream that brings it there.

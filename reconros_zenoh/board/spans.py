@@ -31,16 +31,17 @@ class Timeline:
     """The stages of one message, without gap, until what its callback made of it has been passed on.
 
     Where that goes to a reader on the same board, the reader's timeline follows; `began_ns` is when the first
-    of them started. `callback` is the callback or gateway that serves the message, empty until it took it. A
-    message that came from a clock that is ahead, or that was set back since, starts now.
+    of them started. `callback` is the callback or gateway that serves the message, empty until it took it;
+    `waits_for` is what that waits for now until others provide it. A message that came from a clock that is
+    ahead, or that was set back since, starts now.
     """
 
-    __slots__ = ("_environment", "_since_ns", "began_ns", "callback", "stages_ns", "started_ns")
+    __slots__ = ("_environment", "_since_ns", "began_ns", "callback", "stages_ns", "started_ns", "waits_for")
 
     def __init__(self, environment: VirtualEnvironment, started_ns: int) -> None:
         self._environment = environment
         self.started_ns = self.began_ns = self._since_ns = min(started_ns, environment.now)
-        self.callback = ""
+        self.callback = self.waits_for = ""
         self.stages_ns: defaultdict[Stage, int] = defaultdict(int)
 
     def mark(self, stage: Stage) -> None:

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from reconros_zenoh.board.host import Limit
     from reconros_zenoh.board.slots import Slot
     from reconros_zenoh.board.software import SoftwareImplementation
+    from reconros_zenoh.board.spans import Timeline
     from reconros_zenoh.clock.activity import Awaitable
     from reconros_zenoh.executor.callbacks import Dispatch
 
@@ -30,7 +31,8 @@ class Worker(ABC):
 
     A worker that finds nothing looks again once per poll period; it is woken when something became ready and
     goes on at the next point of that grid (`poll_ns` 0: at once). Each period is as long as it happens to be:
-    the point after k of them is off by sqrt(k) times the deviation of one.
+    the point after k of them is off by sqrt(k) times the deviation of one. `serves` is the timeline of the
+    event whose callback it runs, since `since_ns`, or None.
     """
 
     def __init__(self, executor: Executor, resource: int, poll_ns: int) -> None:
@@ -39,6 +41,8 @@ class Worker(ABC):
         self._environment = executor.board.environment
         self.resource = resource
         self._poll_ns = poll_ns
+        self.serves: Timeline | None = None
+        self.since_ns = 0
         self._activity = Activity(self._run())
 
     def wake(self) -> None:
@@ -51,12 +55,14 @@ class Worker(ABC):
             if dispatch is None:
                 dispatch = yield from self._wait()
             event = cast("Event", dispatch.message)
+            self.serves, self.since_ns = event.timeline, self._environment.now
             event.timeline.callback = dispatch.entry.name
             try:
                 response = yield from self._execute(dispatch, event)
                 self._executor.complete(dispatch, event, response)
             except (Exception, SystemExit) as error:  # noqa: BLE001 - a callback may raise or return anything
                 self._executor.fail(dispatch, event, error)
+            self.serves = None
 
     def _wait(self) -> Generator[Awaitable, object, Dispatch]:
         idle_since_ns = self._environment.now
@@ -145,7 +151,7 @@ class HardwareWorker(Worker):
         implementation = cast("HardwareImplementation", dispatch.implementation)
         yield from board.zycap.write_bitstream(self._slot, implementation.bitstream)
         timeline.mark("reconfiguration")
-        started_ns = self._environment.now
+        self._slot.busy.begin()
         thread = HardwareThread(board, dispatch.entry.name, self._slot, event, implementation)
         try:
             try:
@@ -165,4 +171,4 @@ class HardwareWorker(Worker):
             return response
         finally:
             thread.close()
-            self._slot.busy_ns += self._environment.now - started_ns
+            self._slot.busy.end()

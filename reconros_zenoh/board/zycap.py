@@ -62,9 +62,11 @@ class ZyCAP:
         """Return when the slot holds the bitstream; at once if and only if it does already."""
         if slot.holds == bitstream:
             return
-        started_ns = self._environment.now
+        slot.waiting.begin()
         with self._port.request() as granted:
             yield granted
+            slot.waiting.end()
+            slot.reconfiguring.begin()
             slot.holds = None
             duration_ns = self.reconfiguration_ns(bitstream.size)
             if duration_ns:
@@ -73,6 +75,6 @@ class ZyCAP:
                 yield self._environment.timeout(duration_ns)
                 if self._recovery_ns is not None:
                     self._environment.call_later(self._recovery_ns, self._cpu.resume_stack)
+        slot.reconfiguring.end()
         slot.holds = bitstream
         slot.reconfigurations += 1
-        slot.reconfiguration_ns += self._environment.now - started_ns

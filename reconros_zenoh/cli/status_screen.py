@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 _CALLBACKS_PER_TABLE = 5
 _AGES = ("p50", "p95", "max")
+_SHARED = {"cores": "cores", "icap": "ICAP", "memif": "MEMIF", "stack": "DDS stack"}
 
 
 def print_status(console: Console, status: Mapping[str, Any]) -> None:
@@ -36,18 +37,24 @@ def print_status(console: Console, status: Mapping[str, Any]) -> None:
     )
     _print(
         console,
-        ("slot", "holds", "reconfigurations", "reconfiguring [ms]", "busy [ms]"),
+        ("slot", "holds", "reconfigurations", "reconfiguring [ms]", "waiting for ICAP [ms]", "busy [ms]"),
         (
             (
                 slot["id"],
                 slot["holds"] or "-",
                 slot["reconfigurations"],
                 slot["reconfiguration_ms"],
+                slot["icap_wait_ms"],
                 slot["busy_ms"],
             )
             for slot in status["slots"]
         ),
     )
+    _print_running(console, status["callbacks"], status["elapsed_ms"])
+    if status["use"] is not None:
+        shares = ((name, status["use"][key]) for key, name in _SHARED.items())
+        listed = ", ".join(f"{name} {100 * share:.3g} %" for name, share in shares)
+        console.print(f"busy: {listed}\n", highlight=False)
     _print_spans(console, status["spans_ms"], status["end_to_end_ms"])
     _print(
         console,
@@ -72,6 +79,19 @@ def print_status(console: Console, status: Mapping[str, Any]) -> None:
         listed = ", ".join(f"{name} {count}" for name, count in status["rejected"].items())
         console.print(Text(f"messages refused: {listed}", style="yellow"))
     _print_host(console, status["host"])
+
+
+def _print_running(console: Console, callbacks: Mapping[str, Any], elapsed_ms: float) -> None:
+    """Print a line for each call that has not ended."""
+    for name, callback in callbacks.items():
+        for call in callback["running"]:
+            place = "runs in software" if call["slot"] is None else f"holds slot {call['slot']}"
+            text = f"{name} {place} since {call['since_ms'] / 1e3:.2f} s"
+            text += f", for {(elapsed_ms - call['since_ms']) / 1e3:.2f} s"
+            if call["waits_for"] is None:
+                console.print(Text(text))
+            else:
+                console.print(Text(f"{text}: waits for {call['waits_for']}", style="yellow"))
 
 
 def _print_spans(

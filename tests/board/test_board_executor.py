@@ -116,6 +116,7 @@ def test_where_each_callback_may_run() -> None:
             "calls": 0,
             "failed": 0,
             "dropped": 0,
+            "running": [],
         },
         "b": {
             "kind": "SRV",
@@ -125,6 +126,7 @@ def test_where_each_callback_may_run() -> None:
             "calls": 0,
             "failed": 0,
             "dropped": 0,
+            "running": [],
         },
     }
 

@@ -53,7 +53,7 @@ def test_a_slot_that_waits_for_ever_is_freed(caplog: pytest.LogCaptureFixture) -
     board.environment.run(until=100_000)
     assert executor.failures == {"a": 1}
     assert source.answers == [(1, "well")]
-    assert board.slots[0].busy_ns == 5000
+    assert board.slots[0].busy.ns == 5000
     assert mutex.try_lock("somebody")
     assert mailbox.try_put(7)
     board.environment.run(until=200_000)
@@ -76,7 +76,7 @@ def test_endless_steps_are_stopped(caplog: pytest.LogCaptureFixture) -> None:
     source.put(1)
     board.environment.run(until=100_000)
     assert executor.failures == {"a": 1}
-    assert board.slots[0].busy_ns == 1000
+    assert board.slots[0].busy.ns == 1000
 
 
 def test_the_core_of_a_stopped_callback_is_free(caplog: pytest.LogCaptureFixture) -> None:
@@ -193,4 +193,4 @@ def test_steps_that_catch_everything_are_stopped() -> None:
     source.put(1)
     board.environment.run(until=100_000)
     assert executor.failures == {"a": 1}
-    assert board.slots[0].busy_ns == 1010
+    assert board.slots[0].busy.ns == 1010

@@ -50,6 +50,7 @@ def test_the_status_of_a_board() -> None:
         "profile": "small",
         "domain": 0,
         "executor": "reconros",
+        "elapsed_ms": 10.0,
         "callbacks": {
             "a": {
                 "kind": "SUB",
@@ -59,6 +60,7 @@ def test_the_status_of_a_board() -> None:
                 "calls": 2,
                 "failed": 0,
                 "dropped": 0,
+                "running": [],
             },
             "b": {
                 "kind": "TMR",
@@ -68,12 +70,28 @@ def test_the_status_of_a_board() -> None:
                 "calls": 2,
                 "failed": 1,
                 "dropped": 0,
+                "running": [],
             },
         },
         "slots": [
-            {"id": 0, "holds": "a", "reconfigurations": 1, "reconfiguration_ms": 0.001, "busy_ms": 4.0},
-            {"id": 1, "holds": None, "reconfigurations": 0, "reconfiguration_ms": 0.0, "busy_ms": 0.0},
+            {
+                "id": 0,
+                "holds": "a",
+                "reconfigurations": 1,
+                "reconfiguration_ms": 0.001,
+                "icap_wait_ms": 0.0,
+                "busy_ms": 4.0,
+            },
+            {
+                "id": 1,
+                "holds": None,
+                "reconfigurations": 0,
+                "reconfiguration_ms": 0.0,
+                "icap_wait_ms": 0.0,
+                "busy_ms": 0.0,
+            },
         ],
+        "use": {"cores": 0.1, "icap": 0.0001, "memif": 0.0, "stack": 0.0},
         "publishers": {},
         "gateways": [],
         "hmt": {},
@@ -189,7 +207,9 @@ def test_over_the_wire_the_status_is_msgpack() -> None:
     assert end is None
     assert reply is not None
     assert reply.payload is not None
-    assert msgpack.unpackb(reply.payload) == status(board, executor)
+    told, now = msgpack.unpackb(reply.payload), status(board, executor)
+    assert now["elapsed_ms"] == told["elapsed_ms"] + 0.001
+    assert told == now | {"elapsed_ms": told["elapsed_ms"], "use": told["use"]}
     server.close()
     replies.clear()
     querier.get((b"",), None, replies.append, 10**9)

@@ -40,7 +40,7 @@ def hardware_ns(board: Board, timing: Any, callback: Any = computing, name: str 
     executor.spin()
     source.put(1)
     board.environment.run(until=1_000_000_000)
-    return board.slots[0].busy_ns
+    return board.slots[0].busy.ns
 
 
 def software_ns(board: Board, timing: Any, function: Any = ignore, name: str = "made_up") -> int:

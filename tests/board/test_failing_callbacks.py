@@ -99,7 +99,7 @@ def test_a_callback_in_hardware(when: str, caplog: pytest.LogCaptureFixture) -> 
     # The slot is free again and still holds the bitstream.
     slot = board.slots[0]
     assert slot.reconfigurations == 1
-    assert slot.busy_ns == (14 if when == "before the computation" else 114)
+    assert slot.busy.ns == (14 if when == "before the computation" else 114)
 
 
 def test_each_way_to_fail_is_logged_once_and_every_failure_is_counted(

@@ -285,3 +285,33 @@ def test_a_job_that_is_stopped_leaves_its_share_to_the_others(stop: Callable[[St
     environment.run(until=end)
     # 10 of its 100 units are done after 20 ns together, the other 90 alone.
     assert environment.now == 110
+
+
+@given(st.lists(st.builds(Job, st.integers(0, 50), st.integers(0, 40)), max_size=8), st.integers(1, 400))
+def test_what_has_been_done_is_never_more_than_could_be_and_in_the_end_what_was_asked_for(
+    jobs: list[Job], until_ns: int
+) -> None:
+    environment = VirtualEnvironment()
+    resource = SharedResource(environment, 2, 1)
+
+    def run(job: Job) -> Steps:
+        yield environment.timeout(job.arrives_ns)
+        yield from resource.serve(job.work)
+
+    for job in jobs:
+        start(environment, run(job))
+    environment.run(until=until_ns)
+    assert -1e-9 <= resource.use(until_ns) <= 1 + 1e-9
+    environment.run(until=1000)
+    assert resource.use(1000) * 2000 == pytest.approx(sum(job.work for job in jobs))
+
+
+def test_of_a_job_that_is_given_up_only_what_was_done_counts() -> None:
+    environment = VirtualEnvironment()
+    resource = SharedResource(environment, 2, 1)
+    steps = resource.serve(100)
+    next(steps)
+    environment.run(until=40)
+    steps.close()
+    environment.run(until=80)
+    assert resource.use(80) == 40 / 160

@@ -12,6 +12,7 @@ STATUS = {
     "board": "b",
     "profile": "native",
     "executor": "reconros",
+    "elapsed_ms": 3000.0,
     "domain": 0,
     "callbacks": {
         "sobel": {
@@ -22,9 +23,23 @@ STATUS = {
             "calls": 7,
             "failed": 1,
             "dropped": 2,
+            "running": [
+                {"slot": 2, "since_ms": 104.0, "waits_for": "room in /x"},
+                {"slot": None, "since_ms": 2995.0, "waits_for": None},
+            ],
         }
     },
-    "slots": [{"id": 2, "holds": None, "reconfigurations": 0, "reconfiguration_ms": 0.0, "busy_ms": 12.25}],
+    "slots": [
+        {
+            "id": 2,
+            "holds": None,
+            "reconfigurations": 0,
+            "reconfiguration_ms": 0.0,
+            "icap_wait_ms": 1.5,
+            "busy_ms": 12.25,
+        }
+    ],
+    "use": {"cores": 0.25, "icap": 0.0, "memif": 0.001, "stack": 1.0},
     "publishers": {
         "/out": {"sent": 2, "dropped": 0, "age_p50_ms": 1.5, "age_p95_ms": 2.25, "age_max_ms": 1e4},
         "/full": {"sent": 0, "dropped": 4, "age_p50_ms": None, "age_p95_ms": None, "age_max_ms": None},
@@ -49,8 +64,11 @@ def test_everything_that_the_board_told_is_shown() -> None:
     lines = printed(STATUS)
     assert "board b: profile native, reconros executor, domain 0" in lines
     assert "sobel SUB software, slot 2, slot 3 table, cycles 7 1 2" in lines
-    assert "slot holds reconfigurations reconfiguring [ms] busy [ms]" in lines
-    assert "2 - 0 0 12.2" in lines
+    assert "slot holds reconfigurations reconfiguring [ms] waiting for ICAP [ms] busy [ms]" in lines
+    assert "2 - 0 0 1.5 12.2" in lines
+    assert "sobel holds slot 2 since 0.10 s, for 2.90 s: waits for room in /x" in lines
+    assert "sobel runs in software since 3.00 s, for 0.01 s" in lines
+    assert "busy: cores 25 %, ICAP 0 %, MEMIF 0.1 %, DDS stack 100 %" in lines
     assert lines[lines.index("mean [ms] sobel") + 2 :][:3] == ["dds 1.5", "memif 0.25", "sum 1.75"]
     head = lines.index("publishes sent dropped age [ms]: median p95 max")
     assert lines[head + 2 :][:3] == ["/out 2 0 1.5 2.25 10000", "/full 0 4 - - -", ""]
@@ -69,8 +87,8 @@ def test_of_what_came_through_other_callbacks_the_time_in_all_stands_below_the_s
 
 
 def test_what_there_is_nothing_of_is_left_out() -> None:
-    text = "\n".join(printed(STATUS | {"rejected": {}, "publishers": {}, "spans_ms": {}}))
-    for heading in ("gateway", "stream", "refused", "publishes", "mean"):
+    text = "\n".join(printed(STATUS | {"rejected": {}, "publishers": {}, "spans_ms": {}, "use": None}))
+    for heading in ("gateway", "stream", "refused", "publishes", "mean", "busy:"):
         assert heading not in text
 
 

@@ -215,7 +215,7 @@ def test_two_slots_compute_side_by_side_but_are_reconfigured_one_after_the_other
         (7000, "b is done"),
     ]
     assert stages(board.sources["b"].timelines[0]) == {"reconfiguration": 2000, "execution": 5000}
-    assert [slot.busy_ns for slot in board.board.slots.values()] == [5000, 5000]
+    assert [slot.busy.ns for slot in board.board.slots.values()] == [5000, 5000]
 
 
 def test_a_callback_that_has_ended_may_go_on_at_once_in_the_slot_of_another_worker() -> None:

@@ -53,7 +53,7 @@ def test_a_write_takes_the_size_over_the_bandwidth_and_the_offset() -> None:
     assert log == [(1000 + 110, "slot 0 holds sobel")]
     assert board.slots[0].holds == Bitstream(0, "sobel", BITSTREAM_BYTES)
     assert board.slots[0].reconfigurations == 1
-    assert board.slots[0].reconfiguration_ns == 1110
+    assert board.slots[0].reconfiguring.ns == 1110
 
 
 def test_the_bandwidth_of_the_profile_counts() -> None:
@@ -73,8 +73,8 @@ def test_two_slots_reconfigured_at_once_queue_for_the_one_icap() -> None:
         (400 + 2220, "slot 0 holds sobel"),
         (400 + 3330, "slot 2 holds sobel"),
     ]
-    # What a slot waited counts as reconfiguration, too.
-    assert [board.slots[slot].reconfiguration_ns for slot in (0, 1, 2)] == [2220, 1110, 3330]
+    assert [board.slots[slot].reconfiguring.ns for slot in (0, 1, 2)] == [1110] * 3
+    assert [board.slots[slot].waiting.ns for slot in (0, 1, 2)] == [1110, 0, 2220]
 
 
 def test_a_slot_that_holds_the_bitstream_is_not_written_even_while_the_icap_is_busy() -> None:
