@@ -38,12 +38,13 @@ _VERBS: dict[str, Callable[..., None]] = {
 }
 
 
-def read_deployment(path: Path, environment: Mapping[str, str]) -> DeploymentPlan:
+def read_deployment(path: Path, environment: Mapping[str, str], *, has_end: bool = False) -> DeploymentPlan:
     """Return the boards, clients, cameras, viewers and robots of a Compose file; nothing is started.
 
     FileError names the service whose command cannot be simulated: another one than `reconros board`,
     `client`, `camera`, `viewer`, `robot` and `router`, options that these would refuse, a profile without
-    modelled times, a client, camera or robot without a board.
+    modelled times, a client, camera or robot without a board. It says, too, when there is no board, or,
+    unless it `has_end` anyway, no client, camera or robot.
     """
     services = read_compose(path, environment).services
     nodes = Node.read(path, environment).mapping()["services"].mapping()
@@ -90,6 +91,7 @@ def read_deployment(path: Path, environment: Mapping[str, str]) -> DeploymentPla
             )
     plan = DeploymentPlan(boards, clients, cameras, viewers, robots)
     _check_clients(plan, nodes)
+    _check_end(plan, nodes, has_end=has_end)
     return plan
 
 
@@ -150,9 +152,7 @@ def _parser(verb: str) -> Any:
 
 
 def _check_clients(plan: DeploymentPlan, nodes: Mapping[str, Node]) -> None:
-    """Raise FileError for a client, camera or robot that could never begin, and when there is none."""
-    if not (plan.clients or plan.cameras or plan.robots):
-        raise next(iter(nodes.values())).error("and the others are no clients.", "Add a `reconros client`.")
+    """Raise FileError for a client, camera or robot that could never begin."""
     domains = {name: client.domain for name, client in plan.clients.items()}
     domains |= {name: camera.domain for name, camera in plan.cameras.items()}
     domains |= {name: robot.domain for name, robot in plan.robots.items()}
@@ -171,3 +171,15 @@ def _check_clients(plan: DeploymentPlan, nodes: Mapping[str, Node]) -> None:
                 f"waits for {client.members} clients of the group {client.group!r}, which has {len(group)}.",
                 "Correct --members or add the clients.",
             )
+
+
+def _check_end(plan: DeploymentPlan, nodes: Mapping[str, Node], *, has_end: bool) -> None:
+    """Raise FileError when nothing would ever happen, or it would never end."""
+    first = next(iter(nodes.values()))
+    if not plan.boards:
+        raise first.error("and the others are no boards.", "Add a `reconros board`.")
+    if not (has_end or plan.clients or plan.cameras or plan.robots):
+        raise first.error(
+            "and the others are no clients, with which the simulation would end.",
+            "Say with --seconds how long it runs, or add a `reconros client`.",
+        )

@@ -16,6 +16,7 @@ from reconros_zenoh.cli.console import interrupted, wide_console
 from reconros_zenoh.cli.options import AsJson, project_prints
 from reconros_zenoh.cli.progress import run_bar
 from reconros_zenoh.cli.service_commands import read_deployment
+from reconros_zenoh.cli.status_screen import print_status
 from reconros_zenoh.experiments.deployment import DeploymentRun
 from reconros_zenoh.experiments.interruption import until_interrupted
 from reconros_zenoh.experiments.provenance import own_folder
@@ -43,6 +44,16 @@ def simulate(
         int | None,
         typer.Option(min=1, help="Requests per client.", show_default="those of the file"),
     ] = None,
+    seconds: Annotated[
+        float | None,
+        typer.Option(
+            min=0.001,
+            max=1e9,
+            metavar="S",
+            help="How long, in virtual time.",
+            show_default="until all clients are done",
+        ),
+    ] = None,
     seed: Annotated[
         int | None,
         typer.Option(min=0, help="Seed of all boards and clients.", show_default="those of the file"),
@@ -54,26 +65,36 @@ def simulate(
 ) -> None:
     """Run the Compose file of `up` in virtual time, in one process.
 
-    The same seed gives the same records, bit for bit. Exit status 0 only if every answer was right and
-    nothing was lost. Ctrl-C keeps what was measured.
+    Without clients, as where timers of the boards do all, --seconds says how long. At the end it shows what
+    the boards have done (of clones with --json only). The same seed gives the same records, bit for bit. Exit
+    status 0 only if every answer was right and nothing was lost. Ctrl-C keeps what was measured.
     """
-    plan = read_deployment(file, os.environ).changed(requests, seed)
+    plan = read_deployment(file, os.environ, has_end=seconds is not None).changed(requests, seed)
     with own_folder(out), project_prints(as_json=as_json):
         run = DeploymentRun([plan] if boards is None else [plan.clone(number) for number in range(boards)])
         with (
-            run_bar("virtual time", run.requests, quiet=as_json, each="requests") as advance,
+            run_bar(
+                "virtual time", run.requests, quiet=as_json or not run.requests, each="requests"
+            ) as advance,
             until_interrupted() as interruption,
         ):
-            run.run(advance)
+            run.run(advance, seconds)
         run.write_records(out)
     summaries, totals = run.summaries(), run.totals()
     simulated_s = run.simulated_ns / 1e9
     if as_json:
         facts = {"file": str(file), "simulated_s": simulated_s, "boards": summaries, "all_boards": totals}
-        print(json.dumps(facts | {"interrupted": interruption.happened}))
+        print(json.dumps(facts | {"status": run.statuses, "interrupted": interruption.happened}))
     else:
-        _print_table(wide_console(), summaries | ({"all boards": totals} if len(summaries) > 1 else {}))
-        print(f"{simulated_s:.1f} s of virtual time; the records are in {out}")
+        console = wide_console()
+        if summaries:
+            _print_table(console, summaries | ({"all boards": totals} if len(summaries) > 1 else {}))
+        if boards is None:
+            for status in run.statuses.values():
+                print_status(console, status)
+                console.print()
+        records = f"; the records are in {out}" if summaries else ""
+        print(f"{simulated_s:.1f} s of virtual time{records}")
     if interruption.happened:
         raise interrupted(quiet=as_json)
     raise typer.Exit(0 if run.all_right() else 1)

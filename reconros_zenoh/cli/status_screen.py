@@ -37,7 +37,7 @@ def print_status(console: Console, status: Mapping[str, Any]) -> None:
     )
     _print(
         console,
-        ("slot", "holds", "reconfigurations", "reconfiguring [ms]", "waiting for ICAP [ms]", "busy [ms]"),
+        ("slot", "holds", "reconfigured", "reconfiguring [ms]", "ICAP wait [ms]", "busy [ms]"),
         (
             (
                 slot["id"],
@@ -53,7 +53,7 @@ def print_status(console: Console, status: Mapping[str, Any]) -> None:
     _print_running(console, status["callbacks"], status["elapsed_ms"])
     if status["use"] is not None:
         shares = ((name, status["use"][key]) for key, name in _SHARED.items())
-        listed = ", ".join(f"{name} {100 * share:.3g} %" for name, share in shares)
+        listed = ", ".join(f"{name} {100 * share:.1f} %" for name, share in shares)
         console.print(f"busy: {listed}\n", highlight=False)
     _print_spans(console, status["spans_ms"], status["end_to_end_ms"])
     _print(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
+from reconros_zenoh.board.control import status
 from reconros_zenoh.errors import UsageError
 from reconros_zenoh.experiments.simulation import Simulation
 from reconros_zenoh.measure.record import Record, RecordWriter
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
     from pathlib import Path
 
-    from board_daemon.hosting import BoardOptions
+    from board_daemon.hosting import BoardOptions, HostedBoard
     from host_clients.camera import CameraOptions
     from host_clients.daemon import ClientOptions
     from host_clients.desktop import ViewerOptions
@@ -97,7 +98,7 @@ class DeploymentRun:
 
     `round_trips` holds those of each client, by the names of board and service; those of a viewer are the
     pictures, and those of its control loop have the name of its service with `_control` behind it; those of a
-    robot are from picture to command.
+    robot are from picture to command. `statuses` has the last status of each board by its name.
     """
 
     def __init__(self, plans: Sequence[DeploymentPlan]) -> None:
@@ -107,16 +108,23 @@ class DeploymentRun:
         self.requests += sum(robot.pictures for plan in plans for robot in plan.robots.values())
         self.round_trips: dict[str, dict[str, list[RoundTrip]]] = {}
         self.simulated_ns = 0
+        self.statuses: dict[str, dict[str, Any]] = {}
         self._may_lose: set[str] = set()
 
-    def run(self, on_round_trip: Callable[[], None]) -> None:
-        """Return when all that was added is done; raise UsageError or TransportError otherwise."""
+    def run(self, on_round_trip: Callable[[], None], seconds: float | None = None) -> None:
+        """Return after so many seconds, None: when all that was added is done.
+
+        Raise UsageError or TransportError when that cannot be.
+        """
         with Simulation(TypeRegistry()) as simulation:
+            hosted: list[HostedBoard] = []
             for plan in self._plans:
                 simulation.begin_network()
                 for service, board in plan.boards.items():
                     try:
-                        simulation.add_board(board.profile, board.project, board.mapping, board.options)
+                        hosted.append(
+                            simulation.add_board(board.profile, board.project, board.mapping, board.options)
+                        )
                     except UsageError as error:
                         raise UsageError(f"{service}: {error}") from error
                 for service, client in plan.clients.items():
@@ -138,9 +146,10 @@ class DeploymentRun:
                 for camera in plan.cameras.values():
                     simulation.add_camera(camera)
             try:
-                simulation.run()
+                simulation.run(seconds)
             finally:
                 self.simulated_ns = simulation.environment.now
+                self.statuses = {each.board.name: status(each.board, each.executor) for each in hosted}
 
     def _record(
         self, place: str, service: str, on_round_trip: Callable[[], None]

@@ -43,7 +43,7 @@ _exchange = lru_cache(maxsize=_SEEDS_KEPT * len(EXCHANGES))(exchange)
 
 
 class Simulation:
-    """Boards and clients in one event loop until all clients, cameras and robots are done.
+    """Boards and clients in one event loop until all clients, cameras and robots are done, or for some time.
 
     The same boards and clients, added in the same order, give the same round trips on any machine.
     What does not change is held once, whatever their number: message types, the requests of clients with one
@@ -138,9 +138,15 @@ class Simulation:
         transport = self._network.transport(f"{next(self._sessions):x}")
         return Context(transport, domain, self.environment.clock_ns)
 
-    def run(self) -> None:
-        """Return when all that was added is done; raise TransportError when a client is never answered."""
-        self.environment.run(until=self.environment.all_of(self._done))
+    def run(self, seconds: float | None = None) -> None:
+        """Return after so many seconds, None: when all that was added is done.
+
+        Raise TransportError when a client is never answered.
+        """
+        if seconds is None:
+            self.environment.run(until=self.environment.all_of(self._done))
+        else:
+            self.environment.run(until=round(seconds * 1e9))
 
 
 class _Group:

@@ -64,11 +64,11 @@ def test_everything_that_the_board_told_is_shown() -> None:
     lines = printed(STATUS)
     assert "board b: profile native, reconros executor, domain 0" in lines
     assert "sobel SUB software, slot 2, slot 3 table, cycles 7 1 2" in lines
-    assert "slot holds reconfigurations reconfiguring [ms] waiting for ICAP [ms] busy [ms]" in lines
+    assert "slot holds reconfigured reconfiguring [ms] ICAP wait [ms] busy [ms]" in lines
     assert "2 - 0 0 1.5 12.2" in lines
     assert "sobel holds slot 2 since 0.10 s, for 2.90 s: waits for room in /x" in lines
     assert "sobel runs in software since 3.00 s, for 0.01 s" in lines
-    assert "busy: cores 25 %, ICAP 0 %, MEMIF 0.1 %, DDS stack 100 %" in lines
+    assert "busy: cores 25.0 %, ICAP 0.0 %, MEMIF 0.1 %, DDS stack 100.0 %" in lines
     assert lines[lines.index("mean [ms] sobel") + 2 :][:3] == ["dds 1.5", "memif 0.25", "sum 1.75"]
     head = lines.index("publishes sent dropped age [ms]: median p95 max")
     assert lines[head + 2 :][:3] == ["/out 2 0 1.5 2.25 10000", "/full 0 4 - - -", ""]

@@ -15,6 +15,7 @@ from typer.testing import CliRunner
 
 from board_daemon.hosting import BoardOptions
 from host_clients.daemon import ClientOptions
+from reconros_zenoh.board.answers import StatusAnswer
 from reconros_zenoh.board.profile import read_profile
 from reconros_zenoh.cli.service_commands import read_deployment
 from reconros_zenoh.cli.simulate import simulate
@@ -136,7 +137,7 @@ def test_the_same_seed_gives_the_same_bytes_and_another_seed_others(tmp_path: Pa
 def test_what_was_measured_before_an_interruption_is_kept(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def interrupted(simulation: Simulation) -> None:
+    def interrupted(simulation: Simulation, _: float | None) -> None:
         simulation.environment.run(until=2_000_000_000)
         raise KeyboardInterrupt
 
@@ -145,6 +146,7 @@ def test_what_was_measured_before_an_interruption_is_kept(
     assert (answer["interrupted"], answer["simulated_s"]) == (True, 2)
     shown = run("-f", ROUNDTRIP, "--requests", 1000, "--out", tmp_path, status=130)
     assert shown.endswith("interrupted before its end\n")
+    assert answer["status"]["board0"]["elapsed_ms"] == 2000
     cells = answer["boards"]["board0"]
     assert 0 < cells["inverse"]["n"] < 1000
     for name, content in records(tmp_path).items():
@@ -153,7 +155,8 @@ def test_what_was_measured_before_an_interruption_is_kept(
 
 def test_the_json_names_boards_and_services(tmp_path: Path) -> None:
     answer = json.loads(run("-f", ROUNDTRIP, "--boards", 2, "--requests", 2, "--out", tmp_path, "--json"))
-    assert answer.keys() == {"file", "simulated_s", "boards", "all_boards", "interrupted"}
+    assert answer.keys() == {"file", "simulated_s", "boards", "all_boards", "status", "interrupted"}
+    assert answer["status"].keys() == {"board0-0", "board0-1"}
     assert {client: cell["n"] for client, cell in answer["all_boards"].items()} == dict.fromkeys(CLIENTS, 4)
     slowest = [services["sobel"]["max_ms"] for services in answer["boards"].values()]
     assert answer["all_boards"]["sobel"]["max_ms"] == max(slowest)
@@ -163,6 +166,40 @@ def test_the_json_names_boards_and_services(tmp_path: Path) -> None:
     for services in answer["boards"].values():
         assert services.keys() == CLIENTS
         assert all(cell.keys() >= CELL_KEYS and cell["n"] == 2 for cell in services.values())
+
+
+def test_boards_without_clients_run_for_as_long_as_is_said(tmp_path: Path) -> None:
+    file = write_deployment(tmp_path, f"{BOARD} --name one", f"{BOARD} --name two --domain 1")
+    arguments = ("-f", file, "--seconds", 1.1, "--out", tmp_path / "out")
+    answer = json.loads(run(*arguments, "--json"))
+    assert (answer["simulated_s"], answer["boards"], answer["all_boards"]) == (1.1, {}, {})
+    # A timer of the round-trip application expires every 250 ms.
+    calls = {name: status["callbacks"]["hash"]["calls"] for name, status in answer["status"].items()}
+    assert calls == {"one": 4, "two": 4}
+    for status in answer["status"].values():
+        StatusAnswer.model_validate(status)
+    shown = run(*arguments)
+    heads = [line.split(":")[0] for line in shown.splitlines() if line.startswith("board ")]
+    assert heads == ["board one", "board two"]
+    assert shown.endswith("\n1.1 s of virtual time\n")
+
+
+def test_with_clients_it_ends_at_that_time_with_what_they_have(tmp_path: Path) -> None:
+    shown = run("-f", ROUNDTRIP, "--requests", 10_000, "--seconds", 5, "--out", tmp_path)
+    lines = shown.splitlines()
+    rows = [line.split() for line in lines if line.startswith("board0 ")]
+    assert {row[1] for row in rows} == CLIENTS
+    assert all(0 < int(row[2]) < 10_000 for row in rows)
+    # What the board has done stands below what the clients saw.
+    (below,) = (number for number, line in enumerate(lines) if line.startswith("board board0: profile"))
+    assert below > lines.index("Times in ms.")
+    assert lines[-1].startswith("5.0 s of virtual time; ")
+
+
+def test_clones_are_told_apart_in_the_json_alone(tmp_path: Path) -> None:
+    file = write_deployment(tmp_path, BOARD)
+    shown = run("-f", file, "--boards", 2, "--seconds", 0.5, "--out", tmp_path / "out")
+    assert shown == "0.5 s of virtual time\n"
 
 
 def test_clones_do_not_notice_each_other() -> None:
@@ -238,7 +275,8 @@ def test_clients_of_a_group_begin_together() -> None:
         ([f"{BOARD} --profile=native"], r"services\.s0\.command runs on native"),
         ([f"{BOARD} {ECHO}"], r"services\.s0\.command runs on native"),
         ([BOARD, BOARD], r"services\.s1\.command names a second board 'board0'"),
-        ([BOARD], r"no client"),
+        ([BOARD], r"file\.yaml:2: .*no clients.* --seconds"),
+        (["reconros router"], r"no boards"),
         ([BOARD, "reconros client sort --domain 3"], r"services\.s1\.command asks in domain 3"),
         ([BOARD, "reconros client sort --group g --members 2"], r"services\.s1\.command waits for 2 clients"),
     ],
