@@ -104,7 +104,6 @@ class StatusAnswer(_Part):
     gateways: list[_Gateway]
     hmt: dict[_Text, _Stream]
     spans_ms: dict[_Text, dict[_Text, float]]
-    end_to_end_ms: dict[_Text, float]
     rejected: dict[_Text, int]
     host: _Host
 

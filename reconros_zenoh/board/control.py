@@ -130,7 +130,6 @@ def status(board: Board, executor: Executor) -> dict[str, Any]:
             for topic in board.hardware_topics.values()
         },
         "spans_ms": board.spans.mean_ms(),
-        "end_to_end_ms": board.spans.end_to_end_ms(),
         "rejected": dict(board.context.rejections.counts()),
         "host": {
             "overruns": overruns.count,

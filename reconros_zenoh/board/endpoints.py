@@ -319,7 +319,7 @@ class Writer:
         # A large message is copied into the transport: not by the thread that keeps the clock.
         host = self._board.sending_host
         yield from host.result(host.start(self, outgoing.send))
-        self._board.spans.leave(outgoing.timeline)
+        self._board.spans.add(outgoing.timeline)
         self.sent += 1
         self.ages_ns.append(outgoing.timeline.age_ns)
 

@@ -106,18 +106,10 @@ class Spans:
     def __init__(self) -> None:
         self._messages: defaultdict[str, _Sums] = defaultdict(_Sums)
         self._calls: defaultdict[str, _Sums] = defaultdict(_Sums)
-        self._left: defaultdict[str, tuple[int, int]] = defaultdict(lambda: (0, 0))
 
     def add(self, timeline: Timeline) -> None:
         """Count a message that has been passed on."""
         self._messages[timeline.callback].add(timeline)
-
-    def leave(self, timeline: Timeline) -> None:
-        """Count a message that has left the board."""
-        self.add(timeline)
-        count, total_ns = self._left[timeline.callback]
-        total_ns += timeline.total_ns + timeline.started_ns - timeline.began_ns
-        self._left[timeline.callback] = count + 1, total_ns
 
     def end(self, timeline: Timeline) -> None:
         """Note that a call has ended; it is of no matter once its callback has passed a message on."""
@@ -131,10 +123,3 @@ class Spans:
             callback: {stage: total / sums.count / 1e6 for stage, total in sums.stages_ns.items()}
             for callback, sums in (self._messages | calls).items()
         }
-
-    def end_to_end_ms(self) -> Mapping[str, float]:
-        """Return for each callback whose messages left the board the mean time since they began [ms].
-
-        That is since what caused them came to the board or a timer expired, through all callbacks on the way.
-        """
-        return {callback: total_ns / count / 1e6 for callback, (count, total_ns) in self._left.items()}

@@ -13,6 +13,7 @@ from rich.text import Text
 from reconros_zenoh.cli.console import interrupted, titled_table, wide_console
 from reconros_zenoh.cli.options import AsJson, ModelSeed, ProjectProfile, project_prints
 from reconros_zenoh.cli.progress import run_bar
+from reconros_zenoh.cli.status_screen import SHARED_PARTS
 from reconros_zenoh.errors import UsageError
 from reconros_zenoh.experiments.comparison import MappingRun, outside_topics, run_mapping
 from reconros_zenoh.experiments.interruption import until_interrupted
@@ -182,12 +183,9 @@ def _print(console: Console, experiment: Mapping[str, Any]) -> None:
     boards.add_column("busiest")
     for name, measured in mappings.items():
         counts = (str(measured[key]) for key in ("dropped", "refused", "failed", "reconfigurations"))
-        boards.add_row(Text(name), *counts, _busiest(measured["busiest"]))
+        what, share = measured["busiest"]["what"], measured["busiest"]["share"]
+        boards.add_row(Text(name), *counts, f"{SHARED_PARTS.get(what, what)}: {format_share(share)}")
     console.print(boards)
     if experiment["silent"]:
         silent = ", ".join(experiment["silent"])
         console.print(f"nobody published on {silent}: --input TOPIC, or --bag DIR", style="yellow")
-
-
-def _busiest(busiest: Mapping[str, Any] | None) -> str:
-    return "-" if busiest is None else f"{busiest['what']}: {format_share(busiest['share'])}"

@@ -17,7 +17,8 @@ if TYPE_CHECKING:
 
 _CALLBACKS_PER_TABLE = 5
 _AGES = ("p50", "p95", "max")
-_SHARED = {"cores": "cores", "icap": "ICAP", "memif": "MEMIF", "stack": "DDS stack"}
+SHARED_PARTS = {"cores": "cores", "icap": "ICAP", "memif": "MEMIF", "stack": "DDS stack"}
+"""The keys of a status's `use`, and what the parts are called."""
 
 
 def print_status(console: Console, status: Mapping[str, Any]) -> None:
@@ -52,10 +53,10 @@ def print_status(console: Console, status: Mapping[str, Any]) -> None:
     )
     _print_running(console, status["callbacks"], status["elapsed_ms"])
     if status["use"] is not None:
-        shares = ((name, status["use"][key]) for key, name in _SHARED.items())
+        shares = ((name, status["use"][key]) for key, name in SHARED_PARTS.items())
         listed = ", ".join(f"{name} {100 * share:.1f} %" for name, share in shares)
         console.print(f"busy: {listed}\n", highlight=False)
-    _print_spans(console, status["spans_ms"], status["end_to_end_ms"])
+    _print_spans(console, status["spans_ms"])
     _print(
         console,
         ("publishes", "sent", "dropped", "age [ms]: median", "p95", "max"),
@@ -94,24 +95,15 @@ def _print_running(console: Console, callbacks: Mapping[str, Any], elapsed_ms: f
                 console.print(Text(f"{text}: waits for {call['waits_for']}", style="yellow"))
 
 
-def _print_spans(
-    console: Console, spans_ms: Mapping[str, Mapping[str, float]], end_to_end_ms: Mapping[str, float]
-) -> None:
-    """Print where the time of a message goes, in the order of its way: a column for each callback.
-
-    The last row stands where messages had come through other callbacks of the board before.
-    """
+def _print_spans(console: Console, spans_ms: Mapping[str, Mapping[str, float]]) -> None:
+    """Print where the time of a message goes, in the order of its way: a column for each callback."""
     callbacks = list(spans_ms)
     for first in range(0, len(callbacks), _CALLBACKS_PER_TABLE):
         names = callbacks[first : first + _CALLBACKS_PER_TABLE]
         shown = [spans_ms[name] for name in names]
         stages = [stage for stage in get_args(Stage) if any(stage in each for each in shown)]
-        sums = [sum(each.values()) for each in shown]
         rows = [[stage, *(each.get(stage, 0.0) for each in shown)] for stage in stages]
-        rows.append(["sum", *sums])
-        if any(_ms(end_to_end_ms.get(name, own)) != _ms(own) for name, own in zip(names, sums, strict=True)):
-            rows.append(["end to end", *(end_to_end_ms.get(name, "-") for name in names)])
-        _print(console, ("mean [ms]", *names), rows)
+        _print(console, ("mean [ms]", *names), [*rows, ["sum", *(sum(each.values()) for each in shown)]])
 
 
 def _print_host(console: Console, host: Mapping[str, Any]) -> None:

@@ -43,8 +43,9 @@ class MappingRun:
         """Return the figures; `busiest` is what was busy for the largest share of the time."""
         callbacks, slots = self.status["callbacks"].values(), self.status["slots"]
         published = self.status["publishers"]
-        shares = {f"slot {slot['id']}": slot["busy_ms"] / self.seconds / 1e3 for slot in slots}
-        busiest = max((name for name in shares if shares[name]), key=lambda name: shares[name], default=None)
+        busy = {f"slot {slot['id']}": slot["busy_ms"] / self.seconds / 1e3 for slot in slots}
+        shares = self.status["use"] | busy
+        busiest = max(shares, key=lambda name: shares[name])
         return {
             "outputs": {
                 topic: _output(published[topic]["sent"] if topic in published else 0, self.seconds, ages_ns)
@@ -54,7 +55,7 @@ class MappingRun:
             "refused": sum(self.status["rejected"].values()),
             "failed": sum(callback["failed"] for callback in callbacks),
             "reconfigurations": sum(slot["reconfigurations"] for slot in slots),
-            "busiest": busiest and {"what": busiest, "share": shares[busiest]},
+            "busiest": {"what": busiest, "share": shares[busiest]},
             "status": self.status,
         }
 

@@ -48,7 +48,6 @@ STATUS = {
     "gateways": [],
     "hmt": {},
     "spans_ms": {"sobel": {"dds": 1.5, "memif": 0.25}},
-    "end_to_end_ms": {"sobel": 1.75},
     "rejected": {"truncated": 3},
     "host": {"overruns": 5, "overrun_ms": 1234.5, "lag_p50_us": 31.4, "lag_p99_us": 99.0},
 }
@@ -76,14 +75,6 @@ def test_everything_that_the_board_told_is_shown() -> None:
     assert lines[-1] == (
         "host: event loop late by 31 us (median), 5 results later than modelled (1234 ms in all)"
     )
-
-
-def test_of_what_came_through_other_callbacks_the_time_in_all_stands_below_the_sum() -> None:
-    spans_ms = {"a": {"execution": 1.5}, "b": {"hmt": 0.25, "execution": 2.5}}
-    lines = printed(STATUS | {"spans_ms": spans_ms, "end_to_end_ms": {"b": 4.25}})
-    table = lines[lines.index("mean [ms] a b") + 2 :]
-    assert table[:4] == ["execution 1.5 2.5", "hmt 0 0.25", "sum 1.5 2.75", "end to end - 4.25"]
-    assert not any(line.startswith("end to end") for line in printed(STATUS))
 
 
 def test_what_there_is_nothing_of_is_left_out() -> None:

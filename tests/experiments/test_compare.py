@@ -73,6 +73,7 @@ def test_all_mappings_have_the_same_to_do(tmp_path: Path) -> None:
         assert measured["outputs"]["/filtered"]["sent"] == 0
         assert measured["outputs"]["/filtered"]["median_ms"] is None
         assert measured["failed"] == measured["refused"] == 0
+        assert 0 < measured["busiest"]["share"] < 1
     assert told == json.loads((tmp_path / "out" / "experiment.json").read_text())
 
 

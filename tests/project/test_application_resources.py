@@ -12,10 +12,8 @@ from reconros_zenoh.clock.virtual import VirtualEnvironment
 from reconros_zenoh.errors import UsageError
 from reconros_zenoh.project.loader import load_project
 from reconros_zenoh.project.mapping_file import Mapping
-from reconros_zenoh.ros.graph import NodeToken, parse
-
-
 from reconros_zenoh.rmw.action_client import ActionClient
+from reconros_zenoh.ros.graph import NodeToken, parse
 from reconros_zenoh.ros.qos import QosProfile, Reliability
 from reconros_zenoh.transport.simulated import SimulatedNetwork
 
