@@ -27,6 +27,10 @@ _LONG = 600
 class ReconrosError(Exception):
     """Base of all errors of this project; `str()` is one or more plain sentences for the user."""
 
+    def __reduce__(self) -> tuple[object, ...]:
+        # From another process it comes without __init__, which takes other arguments than `args`.
+        return type(self).__new__, (type(self), *self.args), self.__dict__
+
 
 class UsageError(ReconrosError):
     """What the user gave cannot be used; the message says what to do."""

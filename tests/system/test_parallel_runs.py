@@ -1,4 +1,4 @@
-"""Runs in several processes: none of these outlives the one that started them."""
+"""Runs in several processes: none outlives the one that started them, and their mistakes are told."""
 
 from __future__ import annotations
 
@@ -7,6 +7,11 @@ from signal import SIGINT, SIGKILL, SIGTERM, Signals
 import psutil
 import pytest
 from processes import LIMIT_S, Process
+
+from reconros_zenoh.board.profile import read_profile
+from reconros_zenoh.errors import FileError
+from reconros_zenoh.experiments.parallel import ParallelRuns, Run
+from reconros_zenoh.experiments.roundtrip import application_folder
 
 PROGRAM = """
 from reconros_zenoh.board.profile import read_profile
@@ -30,3 +35,10 @@ def test_no_process_outlives_the_one_that_started_it(number: Signals) -> None:
         assert len(children) >= 2
         process.end(number)
         assert not psutil.wait_procs(children, timeout=LIMIT_S)[1]
+
+
+def test_a_mistake_in_a_run_is_told_as_what_it_is() -> None:
+    mapping = application_folder() / "mappings" / "mixed.toml"
+    runs = [Run(read_profile("zcu104"), mapping, 20, 0)]
+    with ParallelRuns() as parallel, pytest.raises(FileError, match="'zcu104' has no times for callback"):
+        list(parallel.records(runs))
