@@ -11,6 +11,7 @@ import numpy as np
 from reconros_zenoh.board.address_space import PlacedMessage, UnmappedError
 from reconros_zenoh.board.delegate_calls import DelegateCalls
 from reconros_zenoh.board.host import measured
+from reconros_zenoh.board.noted_calls import noted
 from reconros_zenoh.board.timing import cycles_ns
 from reconros_zenoh.errors import PageFaultError
 from reconros_zenoh.ros.c_layout import is_number, number
@@ -156,6 +157,7 @@ class HardwareThread(DelegateCalls):
             else InitData(event.message, event.message_type, board)
         )
 
+    @noted
     def get_init_data(self) -> Generator[Awaitable, object, Any]:
         """Return what the callback was started with, a message with its address: THREAD_GETINITDATA.
 
@@ -178,6 +180,7 @@ class HardwareThread(DelegateCalls):
     def mem_read(
         self, source: int | np.integer[Any] | InitData, size: int, dtype: type[np.generic]
     ) -> Generator[Awaitable, object, Array]: ...
+    @noted
     def mem_read(
         self,
         source: Array | int | np.integer[Any] | InitData,
@@ -203,6 +206,7 @@ class HardwareThread(DelegateCalls):
             self._timeline.mark("memif")
         return data
 
+    @noted
     def mem_write(
         self, data: Array, to: int | np.integer[Any] | InitData | MessageWriter | None = None
     ) -> Generator[Awaitable, object, None]:
@@ -223,6 +227,7 @@ class HardwareThread(DelegateCalls):
         yield from self._board.memif.transfer(data.nbytes)
         self._timeline.mark("memif")
 
+    @noted
     def compute(self, kernel: Callable[..., R], *arguments: object) -> Generator[Awaitable, object, R]:
         """Return `kernel(*arguments)` of a pure kernel when the slot has computed it."""
         host = self._board.host
@@ -239,12 +244,14 @@ class HardwareThread(DelegateCalls):
         self._timeline.mark("overrun")
         return result
 
+    @noted
     def compute_cycles(self, cycles: int) -> Generator[Awaitable, object, None]:
         """Return when so many cycles of the slot's clock have passed; at once where nothing is modelled."""
         if self._time.modelled:
             yield self._environment.timeout(cycles_ns(cycles, self._slot.clock_hz))
             self._timeline.mark("execution")
 
+    @noted
     def publish(self, writer: MessageWriter, message: object) -> Generator[Awaitable, object, None]:
         """Publish the message as its topic is mapped: through the delegate, or onto a stream.
 
@@ -254,6 +261,7 @@ class HardwareThread(DelegateCalls):
             message = self._in_memory(message)
         yield from writer.publish(message, self._osif, self._timeline)
 
+    @noted
     def call(self, client: ClientSource, request: object) -> Generator[Awaitable, object, int]:
         """Call a service through the delegate and return the call's sequence number.
 
@@ -264,6 +272,7 @@ class HardwareThread(DelegateCalls):
         client.send(parts, sequence_number, self._timeline.fork())
         return sequence_number
 
+    @noted
     def send_goal(self, client: ActionClientSource, goal: object) -> Generator[Awaitable, object, bytes]:
         """Send the goal through the delegate and return its id; what becomes of it starts a CLT callback."""
         yield from self._call()
@@ -271,21 +280,25 @@ class HardwareThread(DelegateCalls):
         client.send_goal(goal, goal_id)
         return goal_id
 
+    @noted
     def cancel_goal(self, client: ActionClientSource, goal_id: bytes) -> Generator[Awaitable, object, None]:
         """Ask through the delegate for a goal to end early."""
         yield from self._call()
         client.cancel_goal(goal_id)
 
+    @noted
     def feedback(self, handle: GoalHandle, feedback: object) -> Generator[Awaitable, object, None]:
         """Publish feedback on the goal that the callback serves through the delegate."""
         yield from self._call()
         handle.feedback(feedback)
 
+    @noted
     def is_cancel_requested(self, handle: GoalHandle) -> Generator[Awaitable, object, bool]:
         """Ask the delegate whether the goal that the callback serves shall end early."""
         yield from self._call()
         return handle.is_cancel_requested
 
+    @noted
     def exit(self, response: object = None) -> Generator[Awaitable, object, None]:
         """End the callback, whose answer is `response`: THREAD_EXIT. What stands behind it does not run."""
         yield from self._call()

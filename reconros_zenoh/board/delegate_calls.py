@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, TypeVar
 
+from reconros_zenoh.board.noted_calls import NotedCalls, noted
+
 if TYPE_CHECKING:
     from collections.abc import Generator
 
@@ -15,74 +17,87 @@ if TYPE_CHECKING:
 R = TypeVar("R")
 
 
-class DelegateCalls:
+class DelegateCalls(NotedCalls):
     """The calls of ReconOS to mailboxes, mutexes, conditions and semaphores: base of `HardwareThread`.
 
     Each costs one call through the delegate thread (stage `osif`); what a call waits for counts as `blocked`.
     """
 
     def __init__(self, osif: Osif, timeline: Timeline) -> None:
+        super().__init__()
         self._osif = osif
         self._timeline = timeline
         self._mutexes: dict[Mutex, None] = {}
 
+    @noted
     def mbox_get(self, mailbox: Mailbox) -> Generator[Awaitable, object, int]:
         """Remove the oldest word, once there is one, and return it: MBOX_GET."""
         yield from self._call()
         return (yield from self._blocked("a word in a mailbox", mailbox.get()))
 
+    @noted
     def mbox_put(self, mailbox: Mailbox, word: int) -> Generator[Awaitable, object, None]:
         """Append a word once there is room: MBOX_PUT."""
         yield from self._call()
         yield from self._blocked("room in a mailbox", mailbox.put(word))
 
+    @noted
     def mbox_tryget(self, mailbox: Mailbox) -> Generator[Awaitable, object, int | None]:
         """Remove the oldest word and return it, or None: MBOX_TRYGET."""
         yield from self._call()
         return mailbox.try_get()
 
+    @noted
     def mbox_tryput(self, mailbox: Mailbox, word: int) -> Generator[Awaitable, object, bool]:
         """Append a word and return True, or return False: MBOX_TRYPUT."""
         yield from self._call()
         return mailbox.try_put(word)
 
+    @noted
     def mutex_lock(self, mutex: Mutex) -> Generator[Awaitable, object, None]:
         """Hold the mutex once nobody else does: MUTEX_LOCK."""
         yield from self._call()
         self._mutexes[mutex] = None
         yield from self._blocked("a mutex", mutex.lock(self))
 
+    @noted
     def mutex_trylock(self, mutex: Mutex) -> Generator[Awaitable, object, bool]:
         """Hold the mutex and return True, or return False: MUTEX_TRYLOCK."""
         yield from self._call()
         self._mutexes[mutex] = None
         return mutex.try_lock(self)
 
+    @noted
     def mutex_unlock(self, mutex: Mutex) -> Generator[Awaitable, object, None]:
         """Let others have the mutex: MUTEX_UNLOCK."""
         yield from self._call()
         mutex.unlock(self)
 
+    @noted
     def cond_wait(self, condition: Condition) -> Generator[Awaitable, object, None]:
         """Let others have the mutex, wait for a signal, and hold the mutex again: COND_WAIT."""
         yield from self._call()
         yield from self._blocked("a condition", condition.wait(self))
 
+    @noted
     def cond_signal(self, condition: Condition) -> Generator[Awaitable, object, None]:
         """Let one that waits go on: COND_SIGNAL."""
         yield from self._call()
         condition.signal()
 
+    @noted
     def cond_broadcast(self, condition: Condition) -> Generator[Awaitable, object, None]:
         """Let all that wait go on: COND_BROADCAST."""
         yield from self._call()
         condition.broadcast()
 
+    @noted
     def sem_wait(self, semaphore: Semaphore) -> Generator[Awaitable, object, None]:
         """Count down once the semaphore is above 0: SEM_WAIT."""
         yield from self._call()
         yield from self._blocked("a semaphore", semaphore.wait())
 
+    @noted
     def sem_post(self, semaphore: Semaphore) -> Generator[Awaitable, object, None]:
         """Count up: SEM_POST."""
         yield from self._call()

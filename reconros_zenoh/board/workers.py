@@ -10,12 +10,13 @@ from reconros_zenoh.board.callback import HardwareThread, ThreadExit
 from reconros_zenoh.board.host import measured
 from reconros_zenoh.board.software import SoftwareContext
 from reconros_zenoh.clock.activity import PARK, Activity, Signal, limited
+from reconros_zenoh.errors import CallbackError
 from reconros_zenoh.executor.resource_mask import SOFTWARE
 
 if TYPE_CHECKING:
     from collections.abc import Generator
 
-    from reconros_zenoh.board.callback import HardwareImplementation
+    from reconros_zenoh.board.callback import HardwareCallback, HardwareImplementation
     from reconros_zenoh.board.endpoints import Event
     from reconros_zenoh.board.executor import Executor
     from reconros_zenoh.board.host import Limit
@@ -155,15 +156,16 @@ class HardwareWorker(Worker):
         thread = HardwareThread(board, dispatch.entry.name, self._slot, event, implementation)
         try:
             try:
-                steps = implementation.callback(thread)
-                if not isinstance(steps, GeneratorType):
-                    raise TypeError(
-                        f"a hardware callback is a generator, this one returned {steps!r}. "
-                        "Call what takes time with `yield from`."
-                    )
+                steps = _steps(implementation.callback, thread)
                 response = yield from self._within(implementation.limit, steps)
             except ThreadExit as end:
                 response = end.response
+            except Exception as error:
+                if not_begun := thread.not_begun():
+                    error.add_note(not_begun)
+                raise
+            if not_begun := thread.not_begun():
+                raise CallbackError(not_begun)
             if event.responder is not None:
                 # Sending the response is a call through the delegate, as publishing is.
                 yield from board.osif.call()
@@ -172,3 +174,13 @@ class HardwareWorker(Worker):
         finally:
             thread.close()
             self._slot.busy.end()
+
+
+def _steps(callback: HardwareCallback, thread: HardwareThread) -> Generator[Awaitable, object, object]:
+    steps = callback(thread)
+    if not isinstance(steps, GeneratorType):
+        raise TypeError(
+            f"a hardware callback is a generator, this one returned {steps!r}. "
+            "Call what takes time with `yield from`."
+        )
+    return steps
