@@ -14,7 +14,7 @@ from reconros_zenoh.board.callback import HardwareImplementation
 from reconros_zenoh.board.failures import Failures
 from reconros_zenoh.board.hmt import HmtSource
 from reconros_zenoh.board.host import Limit
-from reconros_zenoh.board.software import SoftwareImplementation
+from reconros_zenoh.board.software import SoftwareImplementation, is_plain
 from reconros_zenoh.board.timing import hardware_time, software_time
 from reconros_zenoh.board.workers import HardwareWorker, SoftwareWorker
 from reconros_zenoh.errors import BadMessageError, UsageError
@@ -123,6 +123,11 @@ class Executor:
         if isinstance(source, HmtSource):
             raise UsageError(f"callback {name!r} reads a hardware-mapped topic: it cannot run in software.")
         self._check_addition(name, function)
+        if not is_plain(function):
+            raise UsageError(
+                f"callback {name!r} has `yield` or `async`: in software it would never run. Give a plain "
+                "function, or run it in hardware."
+            )
         if not self._software_workers:
             raise UsageError(f"callback {name!r} runs in software, but there are no software workers.")
         time = software_time(self.board.profile, name, timing)

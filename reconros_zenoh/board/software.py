@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 from dataclasses import dataclass
 from functools import partial
+from inspect import isasyncgenfunction, iscoroutinefunction, isgeneratorfunction
 from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 
 from reconros_zenoh.errors import CallbackError
@@ -25,6 +26,17 @@ R = TypeVar("R")
 
 SoftwareCallback: TypeAlias = "Callable[[Any, SoftwareContext], object]"
 """Called with the message (None for a timer); a service server's callback returns the response."""
+
+
+def is_plain(function: Callable[..., object]) -> bool:
+    """Tell whether a call runs the function: of one with `yield` or `async` it only makes a generator."""
+    while isinstance(function, partial):
+        function = function.func
+    return not any(
+        is_of_kind(called)
+        for called in (function, type(function).__call__)
+        for is_of_kind in (isgeneratorfunction, iscoroutinefunction, isasyncgenfunction)
+    )
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from functools import partial
+from typing import TYPE_CHECKING, Any
 
 import pytest
 from small_board import BITSTREAM_BYTES, Log, Tickets, ignore, logging_thread, small_board, small_profile
@@ -43,6 +44,56 @@ def test_a_software_callback_needs_a_software_worker() -> None:
     board = small_board(PROFILE, 1)
     with pytest.raises(UsageError, match="'a' runs in software, but there are no software workers"):
         Executor(board, 0, 1).add_sw_callback("a", SUB, Tickets(board), ignore)
+
+
+def generator(_: object, __: object) -> Any:
+    yield
+
+
+async def coroutine(_: object, __: object) -> None:
+    pass
+
+
+async def asynchronous_generator(_: object, __: object) -> Any:
+    yield
+
+
+class Called:
+    def __call__(self, _: object, __: object) -> Any:
+        yield
+
+    method = generator
+
+
+@pytest.mark.parametrize(
+    "function",
+    [
+        generator,
+        coroutine,
+        asynchronous_generator,
+        partial(generator, 1),
+        partial(partial(Called()), 1),
+        Called(),
+        Called().method,
+    ],
+)
+def test_a_software_callback_that_a_call_would_not_run_is_refused(function: Any) -> None:
+    board = small_board(PROFILE)
+    executor = Executor(board, 1, 0)
+    with pytest.raises(UsageError, match="'a' has `yield` or `async`: in software it would never run"):
+        executor.add_sw_callback("a", SUB, Tickets(board), function)
+    assert not executor.statistics()
+
+
+class Plain:
+    def __call__(self, _: object, __: object) -> None:
+        pass
+
+
+@pytest.mark.parametrize("function", [ignore, partial(ignore), Plain(), Plain, print, "".join])
+def test_everything_else_that_can_be_called_is_a_software_callback(function: Any) -> None:
+    board = small_board(PROFILE)
+    Executor(board, 1, 0).add_sw_callback("a", SUB, Tickets(board), function)
 
 
 def test_a_hardware_callback_needs_a_slot_that_a_worker_serves() -> None:
