@@ -127,6 +127,7 @@ class ActionServer:
 
         Raises UsageError when the result is not of the action's type.
         """
+        self._type.result.check(result)
         response = zero_message(self._type.get_result.response)
         response.status, response.result = int(handle.outcome), result
         parts = self._type.get_result.response.encode(response)
@@ -144,7 +145,8 @@ class ActionServer:
         self.finish(handle, zero_message(self._type.result))
 
     def publish_feedback(self, handle: GoalHandle, feedback: object) -> None:
-        """Publish feedback on a goal."""
+        """Publish feedback on a goal; raise UsageError when it is not of the action's type."""
+        self._type.feedback.check(feedback)
         message = zero_message(self._type.feedback_message)
         message.goal_id.uuid[:] = list(handle.goal_id)
         message.feedback = feedback

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import reprlib
 import struct
 from dataclasses import dataclass
 from functools import cached_property
@@ -14,6 +15,7 @@ from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, TypesysError, get_typestore
 
 from reconros_zenoh.errors import BadMessageError, FileError, UsageError
+from reconros_zenoh.ros.array_fields import ArrayFields
 from reconros_zenoh.ros.definitions import (
     action_definitions,
     char_as_uint8,
@@ -72,6 +74,7 @@ class MessageType:
         self.fields = definition.fields
         self._fields_before = [field for field, _ in definition.fields[:-1]]
         self._last_array = _last_array(definition.fields)
+        self._array_fields = ArrayFields(store, name)
 
     def __repr__(self) -> str:
         return f"MessageType({self.name!r})"
@@ -82,14 +85,26 @@ class MessageType:
             self._nested[name] = MessageType(self._store, name)
         return self._nested[name]
 
+    def check(self, message: object) -> None:
+        """Raise UsageError for what is no message of this type, which may be that of another registry."""
+        if type(message) is not self.cls and getattr(message, "__msgtype__", None) != self.name:
+            found = getattr(message, "__msgtype__", None)
+            raise UsageError(
+                f"A message of type {self.name} is wanted, not "
+                + (f"one of type {found}." if found else f"{reprlib.repr(message)}.")
+            )
+
     def encode(self, message: Any, *, joined_at_once: bool = False) -> tuple[bytes | memoryview, ...]:
         """Return the parts that joined are `message` as XCDR1 little endian, with its encapsulation.
 
         A big array in the last field that nobody can change is not copied: the last part is a view of it.
         With `joined_at_once` none is: then it must not change before the parts are joined. Raises UsageError
-        for a message whose fields do not have their types.
+        for a message of another type, or whose fields do not have their types.
         """
+        self.check(message)
         try:
+            if self._array_fields.are_some:
+                self._array_fields.check(message)
             if self._last_array is not None:
                 field, empty = self._last_array
                 array = getattr(message, field)

@@ -123,6 +123,20 @@ def test_a_callback_that_fails_aborts_its_goal(caplog: pytest.LogCaptureFixture)
     case.run()
     assert [event.status for event in case.events if event.kind == "result"] == [GoalStatus.ABORTED] * 2
     assert case.executor.failures == {"serve": 2}
+    assert "Fibonacci_Result is wanted, not 1.0." in str(caplog.records[-1].exc_info)
+
+
+def test_feedback_of_another_type_fails_the_callback(caplog: pytest.LogCaptureFixture) -> None:
+    def answers(_: Serving) -> Any:
+        def callback(goal: GoalHandle, _: SoftwareContext) -> Any:
+            goal.feedback(goal.goal)
+
+        return callback
+
+    case = Serving(answers, hardware=False)
+    case.send(5)
+    assert "feedback" not in case.run()
+    assert "Fibonacci_Feedback is wanted, not one of type" in str(caplog.records[-1].exc_info)
 
 
 def test_goals_that_are_refused_are_logged_once_for_each_client(caplog: pytest.LogCaptureFixture) -> None:

@@ -14,7 +14,7 @@ from reconros_zenoh.board.endpoints import ServiceSource, SubscriptionSource, To
 from reconros_zenoh.board.executor import Executor
 from reconros_zenoh.board.hmt import FifoPlan, HmtSource, HmtWriter
 from reconros_zenoh.board.spans import Timeline
-from reconros_zenoh.errors import TransportError
+from reconros_zenoh.errors import TransportError, UsageError
 from reconros_zenoh.executor.callbacks import CallbackKind
 
 if TYPE_CHECKING:
@@ -175,6 +175,35 @@ def test_a_message_that_cannot_be_encoded_is_a_failure_of_its_callback(
     assert "std_msgs/msg/UInt32 cannot be serialised" in str(caplog.records[0].exc_info)
 
 
+@pytest.mark.parametrize("way", ["software", "hardware", "stream"])
+def test_a_message_of_another_type_is_not_published(way: str, caplog: pytest.LogCaptureFixture) -> None:
+    board = small_board(PROFILE, 1)
+    word, node = types().message("std_msgs/msg/UInt32"), board.context.node("server")
+    topic = board.hardware_topic("/out", word)
+    writer = HmtWriter(topic) if way == "stream" else TopicWriter(board, node, word, "/out")
+    message = types().message("std_msgs/msg/Int32").cls(data=7)
+    got: list[object] = []
+    desktop(board).node("client").subscription(word, "/out", got.append)
+
+    def thread(thread: HardwareThread) -> Steps:
+        yield from thread.publish(writer, message)
+
+    executor, source = Executor(board, 1, 1), Tickets(board)
+    if way == "software":
+        executor.add_sw_callback(
+            "a", CallbackKind.SUB, source, lambda _, context: context.publish(writer, message)
+        )
+    else:
+        executor.add_hw_callback("a", [0], CallbackKind.SUB, source, thread)
+    executor.spin()
+    source.put("ticket")
+    board.environment.run(until=10_000)
+    assert not got
+    assert topic.passed == 0
+    told = "A message of type std_msgs/msg/UInt32 is wanted, not one of type std_msgs/msg/Int32."
+    assert one_failure(caplog, "a", UsageError) == told
+
+
 class ServiceBoard:
     """A service whose callback answers `yes`, raises, or returns what is no response."""
 
@@ -233,7 +262,10 @@ def test_a_service_callback_that_returns_no_response_has_failed(
     service = ServiceBoard(in_hardware=in_hardware)
     answer = service.call(returns=returns)
     assert isinstance(answer, TransportError)
-    assert "callback a failed: A message of type std_srvs/srv/SetBool_Response cannot be" in str(answer)
+    assert str(answer) == (
+        "service /ask refused: callback a failed: A message of type std_srvs/srv/SetBool_Response is wanted, "
+        f"not {returns!r}."
+    )
     assert len(caplog.records) == 1
     assert service.executor.failures == {"a": 1}
     assert service.call(returns=service.yes()) == service.yes()

@@ -15,6 +15,7 @@ from rosbags.interfaces import Nodetype
 from reconros_zenoh.errors import BadMessageError, UsageError
 from reconros_zenoh.ros import types
 from reconros_zenoh.ros.types import MessageType, TypeRegistry
+from reconros_zenoh.ros.zero_message import zero_message
 
 REGISTRY = TypeRegistry()
 REGISTRY.add_service("sorter_msgs/srv/Sort", "uint32[] unsorted\n---\nuint32[] sorted\n")
@@ -24,6 +25,7 @@ REGISTRY.add_message("lab_msgs/msg/Bounded", "uint8 id\nuint32[<=300] data\n")
 REGISTRY.add_message("lab_msgs/msg/Wide", "uint8 id\nuint64[] data\n")
 REGISTRY.add_message("lab_msgs/msg/Names", "uint8[3] rgb\nstring[] names\n")
 REGISTRY.add_message("lab_msgs/msg/Nested", "Wide[] wide\nShorts[2] shorts\nfloat64 last\n")
+REGISTRY.add_message("lab_msgs/msg/Floats", "float32[] data\n")
 REGISTRY.add_message("lab_msgs/msg/Keyword", "uint8 from\nuint8[] import\n")
 
 TYPES = [
@@ -234,9 +236,74 @@ def test_a_number_that_does_not_fit_is_a_usage_error(value: Any) -> None:
         kind.encode(kind.cls(value))
 
 
-def test_a_message_of_another_type_and_half_a_character_are_usage_errors() -> None:
-    with pytest.raises(UsageError, match="cannot be serialised"):
-        IMAGE.encode(STRING.cls("hello"))
+FLOATS = REGISTRY.message("lab_msgs/msg/Floats")
+WRONG_DTYPES = [np.int32, np.uint32, ">f4", np.float64, np.bool_]
+
+
+@pytest.mark.parametrize("length", [0, 3, 100_000])
+@pytest.mark.parametrize("dtype", WRONG_DTYPES)
+def test_an_array_of_another_dtype_is_a_usage_error_that_names_the_field(length: int, dtype: Any) -> None:
+    array = np.ones(length, dtype)
+    with pytest.raises(UsageError) as caught:
+        FLOATS.encode(FLOATS.cls(array))
+    assert (
+        f"field 'data' of lab_msgs/msg/Floats is an array of {array.dtype}, not an array of float32"
+        in str(caught.value)
+    )
+
+
+def test_an_array_of_another_dtype_in_a_message_within() -> None:
+    wide, shorts = REGISTRY.message("lab_msgs/Wide").cls, REGISTRY.message("lab_msgs/Shorts").cls
+    kind = REGISTRY.message("lab_msgs/Nested")
+    right = shorts(1, np.zeros(2, np.int16))
+    kind.encode(kind.cls([wide(1, np.zeros(2, np.uint64))], [right, right], 0.5))
+    with pytest.raises(UsageError, match="'data' of lab_msgs/msg/Wide is an array of int64, not an array"):
+        kind.encode(kind.cls([wide(1, np.zeros(2, np.int64))], [right, right], 0.5))
+    with pytest.raises(UsageError, match="'data' of lab_msgs/msg/Shorts is a list, not an array of int16"):
+        kind.encode(kind.cls([], [right, shorts(1, [1])], 0.5))
+
+
+def test_an_array_of_another_dtype_in_the_only_message_within() -> None:
+    kind = REGISTRY.message("geometry_msgs/PoseWithCovarianceStamped")
+    message = zero_message(kind)
+    kind.encode(message)
+    message.pose.covariance = np.zeros(36, np.int64)
+    with pytest.raises(UsageError, match="'covariance' of geometry_msgs/msg/PoseWithCovariance is an array"):
+        kind.encode(message)
+
+
+@pytest.mark.parametrize("dtype", [np.int8, np.uint8])
+def test_a_byte_may_be_signed_or_not(dtype: Any) -> None:
+    kind = REGISTRY.message("std_msgs/ByteMultiArray")
+    message = zero_message(kind)
+    message.data = np.array([1, 200]).astype(dtype)
+    assert b"".join(kind.encode(message))[-2:] == b"\x01\xc8"
+
+
+@pytest.mark.parametrize(
+    ("message", "told"),
+    [
+        (REGISTRY.message("std_msgs/Int32").cls(7), "one of type std_msgs/msg/Int32"),
+        (None, "None"),
+        ("seven", "'seven'"),
+    ],
+)
+def test_a_message_of_another_type_is_a_usage_error(message: object, told: str) -> None:
+    with pytest.raises(UsageError) as caught:
+        REGISTRY.message("std_msgs/UInt32").encode(message)
+    assert str(caught.value) == f"A message of type std_msgs/msg/UInt32 is wanted, not {told}."
+
+
+def test_a_message_of_another_registry_is_one_of_its_type() -> None:
+    other = TypeRegistry()
+    other.add_message("lab_msgs/msg/Wide", "uint8 id\nuint64[] data\n")
+    message = other.message("lab_msgs/Wide").cls(1, np.zeros(2, np.uint64))
+    kind = REGISTRY.message("lab_msgs/Wide")
+    assert type(message) is not kind.cls
+    assert kind.encode(message) == other.message("lab_msgs/Wide").encode(message)
+
+
+def test_half_a_character_is_a_usage_error() -> None:
     with pytest.raises(UsageError, match="cannot be serialised"):
         STRING.encode(STRING.cls("\ud800"))
 
