@@ -9,6 +9,7 @@ from reconros_zenoh.board.endpoints import Event, Source
 from reconros_zenoh.board.spans import Timeline
 from reconros_zenoh.board.stack_node import StackNode
 from reconros_zenoh.errors import BadMessageError, UsageError
+from reconros_zenoh.executor.callbacks import CallbackKind
 from reconros_zenoh.rmw.action_client import ActionClient
 from reconros_zenoh.rmw.action_server import ActionServer
 from reconros_zenoh.ros.message_arrays import snapshot
@@ -36,6 +37,8 @@ class ActionSource(Source):
     further ones are not accepted, nor are those that the callback's `check` refuses. A goal that is canceled
     while it waits is started all the same, with `is_cancel_requested`.
     """
+
+    kind = CallbackKind.SRV
 
     def __init__(self, board: Board, node: Node, action_type: ActionType, name: str) -> None:
         super().__init__()
@@ -99,6 +102,8 @@ class ActionClientSource(Source):
 
     Of feedback that nobody takes the last 10 are kept; everything else waits however long it takes.
     """
+
+    kind = CallbackKind.CLT
 
     def __init__(self, board: Board, node: Node, action_type: ActionType, name: str) -> None:
         super().__init__()

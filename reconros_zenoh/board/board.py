@@ -176,7 +176,9 @@ class Board:
         bitstream = slot.admit(name, alone=True)
         if at_power_up:
             slot.holds = bitstream
-        gateway = Gateway(self, self.context.node(name), topic, smt, qos or QosProfile(), slot, bitstream)
+        gateway = Gateway(
+            self, self.context.node(name), topic, smt, QosProfile.or_default(qos), slot, bitstream
+        )
         self.gateways.append(gateway)
         return gateway
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property, partial
+from operator import attrgetter
 from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar, overload
 
 import numpy as np
@@ -88,15 +89,13 @@ class InitData:
         return self._placed.address
 
     def array(self, path: str) -> Array:
-        """Return a field, `data` or `header.stamp.sec`, as an array; a number as an array of one."""
-        message, message_type = self.message, self._type
-        *messages, last = path.split(".")
-        for name in messages:
-            message = getattr(message, name)
-            message_type = message_type.nested(str(dict(message_type.fields)[name][1]))
-        form = dict(message_type.fields)[last]
+        """Return a field, `data` or `header.stamp.sec`, as an array; a number as an array of one.
+
+        Raises UsageError for what is no field of the message.
+        """
+        form = self._type.form(path)
         dtype = number(form) if is_number(form) else None
-        array = np.atleast_1d(np.asarray(getattr(message, last), dtype))
+        array = np.atleast_1d(np.asarray(attrgetter(path)(self.message), dtype))
         self._arrays.append(array)
         return array
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from reconros_zenoh.board.endpoints import Event, Reader, Writer
 from reconros_zenoh.board.spans import Timeline
 from reconros_zenoh.errors import BadMessageError, TransportError
+from reconros_zenoh.executor.callbacks import CallbackKind
 from reconros_zenoh.rmw.received import Received
 from reconros_zenoh.ros.qos import History, QosProfile
 
@@ -34,6 +35,8 @@ class ClientSource(Reader):
     Responses come in the order in which they arrive and wait however long it takes; each call has a
     `sequence_number`, which stands on the wire as in ROS 2.
     """
+
+    kind = CallbackKind.CLT
 
     def __init__(self, board: Board, node: Node, service_type: ServiceType, name: str) -> None:
         super().__init__(board, service_type.response, QosProfile(history=History.KEEP_ALL))

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 from reconros_zenoh.board.spans import Timeline
 from reconros_zenoh.board.stream import Stream
 from reconros_zenoh.errors import BadMessageError, UsageError
+from reconros_zenoh.executor.callbacks import CallbackKind
 from reconros_zenoh.ros.qos import QosProfile, Reliability
 
 if TYPE_CHECKING:
@@ -51,7 +52,13 @@ class Event(NamedTuple):
 
 
 class Source:
-    """What makes a callback ready: a queue of events, the last `depth` of them (None: all)."""
+    """What makes a callback ready: a queue of events, the last `depth` of them (None: all).
+
+    `kind` is that of its callbacks, None where it may be any; `message_type` as in its events.
+    """
+
+    kind: CallbackKind | None = None
+    message_type: MessageType | None = None
 
     def __init__(self, depth: int | None = None) -> None:
         self._queue: deque[Event] = deque(maxlen=depth)
@@ -128,10 +135,12 @@ class Reader(Source):
     out or, with best effort, lost.
     """
 
+    message_type: MessageType
+
     def __init__(self, board: Board, message_type: MessageType, qos: QosProfile) -> None:
         super().__init__(qos.queue_depth)
         self._board = board
-        self._message_type = message_type
+        self.message_type = message_type
         self._reliable = qos.reliability is Reliability.RELIABLE
         self._stream: Stream[_Incoming] = Stream(self._receive, qos.queue_depth)
 
@@ -158,7 +167,7 @@ class Reader(Source):
                     received.message,
                     timeline,
                     received.responder,
-                    self._message_type,
+                    self.message_type,
                     size=received.size,
                     publisher=received.publisher,
                     sequence_number=received.sequence_number,
@@ -174,6 +183,8 @@ class SubscriptionSource(Reader):
     It discards what `own` does not let pass. `in_hardware` says that its callback runs in slots.
     """
 
+    kind = CallbackKind.SUB
+
     def __init__(
         self,
         board: Board,
@@ -185,7 +196,7 @@ class SubscriptionSource(Reader):
         own: PublisherFilter | None = None,
         in_hardware: bool = False,
     ) -> None:
-        self.qos = qos or QosProfile()
+        self.qos = QosProfile.or_default(qos)
         super().__init__(board, message_type, self.qos)
         self.in_hardware = in_hardware
         self._own = own
@@ -195,7 +206,7 @@ class SubscriptionSource(Reader):
     def open(self, on_ready: Callable[[], None], check: Callable[[Any], None] | None) -> None:
         """Subscribe."""
         super().open(on_ready, check)
-        subscription = self._node.subscription(self._message_type, self._topic, self.arrive, self.qos, check)
+        subscription = self._node.subscription(self.message_type, self._topic, self.arrive, self.qos, check)
         if self._board.topics is not None:
             self._board.topics.add_reader(subscription.key, self)
 
@@ -228,6 +239,8 @@ class SubscriptionSource(Reader):
 class ServiceSource(Reader):
     """A service server: ready while a request waits."""
 
+    kind = CallbackKind.SRV
+
     def __init__(self, board: Board, node: Node, service_type: ServiceType, name: str) -> None:
         super().__init__(board, service_type.request, QosProfile())
         self._node = node
@@ -252,6 +265,8 @@ class TimerSource(Source):
 
     Expiries that nobody took before the next are one, as in rcl; the others count in `dropped`.
     """
+
+    kind = CallbackKind.TMR
 
     def __init__(self, board: Board, period_ns: int) -> None:
         if period_ns < 1:
@@ -332,7 +347,7 @@ class TopicWriter:
     def __init__(
         self, board: Board, node: Node, message_type: MessageType, topic: str, qos: QosProfile | None = None
     ) -> None:
-        qos = qos or QosProfile()
+        qos = QosProfile.or_default(qos)
         self._writer = Writer(board, qos)
         self._publisher = node.publisher(message_type, topic, qos)
         self.topic = self._publisher.name

@@ -5,10 +5,12 @@ from __future__ import annotations
 import logging
 import math
 from collections import Counter, defaultdict
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import partial
 from typing import TYPE_CHECKING, Any, Literal
 
+from reconros_zenoh.board.additions import check_addition
 from reconros_zenoh.board.bitstream import Bitstream, read_bitstreams
 from reconros_zenoh.board.callback import HardwareImplementation
 from reconros_zenoh.board.failures import Failures
@@ -24,7 +26,7 @@ from reconros_zenoh.executor.resource_mask import SOFTWARE, ResourceMask
 from reconros_zenoh.executor.standard import StandardExecutor
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable
     from pathlib import Path
 
     from reconros_zenoh.board.board import Board
@@ -122,7 +124,7 @@ class Executor:
         """
         if isinstance(source, HmtSource):
             raise UsageError(f"callback {name!r} reads a hardware-mapped topic: it cannot run in software.")
-        self._check_addition(name, function)
+        self._check_addition(name, kind, source, function, timing)
         if not is_plain(function):
             raise UsageError(
                 f"callback {name!r} has `yield` or `async`: in software it would never run. Give a plain "
@@ -151,7 +153,10 @@ class Executor:
         One that is not reconfigurable holds it from the start, and no other callback can be added to it; none
         can be added to one with a gateway.
         """
-        self._check_addition(name, thread)
+        self._check_addition(name, kind, source, thread, timing)
+        slots = list(slots) if isinstance(slots, Iterable) else []
+        if not slots:
+            raise UsageError(f"callback {name!r} has no slots to run in. Give their ids: [0].")
         served = {slot.slot_id for slot in self._slots}
         for slot in slots:
             if slot not in served:
@@ -274,9 +279,10 @@ class Executor:
         drift_ns = poll_ns * self._poll_jitter * math.sqrt(idle_ns / poll_ns)
         return round(-(idle_ns + self.board.randomness.gauss(0, drift_ns)) % poll_ns)
 
-    def _check_addition(self, name: str, function: object) -> None:
-        if not callable(function):
-            raise UsageError(f"callback {name!r} is {function!r}, which cannot be called. Give a function.")
+    def _check_addition(
+        self, name: str, kind: object, source: object, function: object, timing: object
+    ) -> None:
+        check_addition(name, kind, source, function, timing)
         if self._is_spinning:
             raise UsageError(
                 f"callback {name!r} is added to an executor that spins already. Call spin() last."

@@ -14,6 +14,7 @@ from reconros_zenoh.board.endpoints import Event, Source
 from reconros_zenoh.board.stream import Stream
 from reconros_zenoh.clock.activity import Signal
 from reconros_zenoh.errors import BadMessageError, UsageError
+from reconros_zenoh.executor.callbacks import CallbackKind
 from reconros_zenoh.ros.message_arrays import snapshot
 from reconros_zenoh.ros.qos import QosProfile
 
@@ -245,9 +246,12 @@ class HardwareTopic:
 class HmtSource(Source):
     """A hardware callback's subscription to a hardware-mapped topic: ready while a message waits."""
 
+    kind = CallbackKind.SUB
+
     def __init__(self, board: Board, topic: HardwareTopic, plan: FifoPlan) -> None:
         super().__init__()
         topic.has_callback = True
+        self.message_type = topic.type
         self._board = board
         self._topic = topic
         self._fifo = Fifo(plan, self._arrived, None, cut_through=False)
@@ -270,7 +274,7 @@ class HmtSource(Source):
         """Remove the oldest message and return it, as it lies in the slot."""
         streamed = self._fifo.take()
         streamed.timeline.mark("hmt")
-        return Event(streamed.message, streamed.timeline, message_type=self._topic.type, in_slot=True)
+        return Event(streamed.message, streamed.timeline, message_type=self.message_type, in_slot=True)
 
     def _arrived(self) -> None:
         try:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from reconros_zenoh.errors import UsageError
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator
 
@@ -29,6 +31,10 @@ class Kernel:
     reads: tuple[str, ...]
     answer: Callable[[Any, np.ndarray[Any, Any]], object]
     publish: MessageWriter | None = None
+
+    def __post_init__(self) -> None:
+        if isinstance(self.reads, str):
+            raise UsageError(f"Kernel(reads={self.reads!r}): write the fields as a tuple, ({self.reads!r},).")
 
     def __call__(self, thread: HardwareThread) -> Generator[Awaitable, object, object]:
         """Run as the callback of a hardware thread."""

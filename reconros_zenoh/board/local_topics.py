@@ -178,7 +178,7 @@ class LocalTopicWriter(TopicWriter):
         *,
         in_place: bool = False,
     ) -> None:
-        qos = qos or QosProfile()
+        qos = QosProfile.or_default(qos)
         super().__init__(board, node, message_type, topic, qos)
         self._board = board
         self._topics = topics

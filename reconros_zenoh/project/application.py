@@ -14,7 +14,6 @@ from reconros_zenoh.board.hmt import HmtSource, HmtWriter
 from reconros_zenoh.board.os_resources import Condition, Mailbox, Mutex, Semaphore, SharedMemory
 from reconros_zenoh.board.stack_node import StackNode
 from reconros_zenoh.errors import FileError, UsageError
-from reconros_zenoh.executor.callbacks import CallbackKind
 from reconros_zenoh.project.build_cfg import RosGateway
 from reconros_zenoh.project.communication import endpoint_name, gateway_pair, gateway_slots
 from reconros_zenoh.rmw.parameters import Parameters
@@ -38,14 +37,6 @@ if TYPE_CHECKING:
 
 
 T = TypeVar("T")
-_KINDS = {
-    "rostmr": CallbackKind.TMR,
-    "rossub": CallbackKind.SUB,
-    "rossrvs": CallbackKind.SRV,
-    "rosactions": CallbackKind.SRV,
-    "rossrvc": CallbackKind.CLT,
-    "rosactionc": CallbackKind.CLT,
-}
 
 
 class Application:
@@ -198,7 +189,7 @@ class Application:
                 f"callback {name!r} has no resource {resource!r} in its groups, {', '.join(groups)}."
             )
         source = self.source(group, resource, qos)
-        kind = _KINDS[self._resources[group, resource].type]
+        kind = _required(source.kind)
         executor = self._mapped = self._mapped or self._mapped_executor()
         place = self.mapping.callbacks[name]
         if place.software:

@@ -81,7 +81,7 @@ class Node:
         on_matching: Callable[[bool], None] | None = None,
     ) -> Publisher:
         """Return a new publisher; `on_matching` as in `Transport.publish`."""
-        return Publisher(self, message_type, topic, qos or QosProfile(), on_matching)
+        return Publisher(self, message_type, topic, QosProfile.or_default(qos), on_matching)
 
     def subscription(
         self,
@@ -92,7 +92,7 @@ class Node:
         check: Callable[[Any], None] | None = None,
     ) -> Subscription:
         """Return a new subscription; see there for `sink` and `check`."""
-        return Subscription(self, message_type, topic, qos or QosProfile(), sink, check)
+        return Subscription(self, message_type, topic, QosProfile.or_default(qos), sink, check)
 
     def service(
         self,

@@ -64,6 +64,24 @@ class QosProfile:
     liveliness: Liveliness = Liveliness.AUTOMATIC
     lease_ns: int = INFINITE_NS
 
+    def __post_init__(self) -> None:
+        for name, policies in _ENUMS.items():
+            policy = getattr(self, name)
+            if not isinstance(policy, policies):
+                known = " or ".join(f"{policies.__name__}.{known.name}" for known in policies)
+                raise UsageError(f"{name} is {policy!r}. Write {known}.")
+        if not isinstance(self.depth, int):
+            raise UsageError(f"depth is {self.depth!r}. Write a whole number.")
+
+    @classmethod
+    def or_default(cls, qos: QosProfile | None) -> QosProfile:
+        """Return the profile, or the default in place of None; raise UsageError for anything else."""
+        if qos is None:
+            return cls()
+        if not isinstance(qos, cls):
+            raise UsageError(f"qos is {qos!r}. Write a QosProfile: QosProfile(depth=10).")
+        return qos
+
     @classmethod
     def of_words(cls, words: Mapping[str, str | int]) -> Self:
         """Return the profile with these policies, named as in the QoS files and options of ROS 2.
@@ -149,6 +167,7 @@ _POLICIES: Mapping[str, type[IntEnum]] = {
     "durability": Durability,
     "history": History,
 }
+_ENUMS: Mapping[str, type[IntEnum]] = {**_POLICIES, "liveliness": Liveliness}
 _RMW_DEFAULT = QosProfile(depth=42)
 # SYSTEM_DEFAULT and BEST_AVAILABLE of each policy
 _LEFT_OPEN: Mapping[type[IntEnum], tuple[str, ...]] = {

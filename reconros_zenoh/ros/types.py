@@ -29,7 +29,7 @@ from reconros_zenoh.ros.standard import standard_interfaces
 if TYPE_CHECKING:
     from collections.abc import Collection
 
-    from rosbags.interfaces.typing import Fielddefs, Typesdict
+    from rosbags.interfaces.typing import Fielddefs, FieldDesc, Typesdict
     from rosbags.typesys.store import Typestore
 
 _ENCAPSULATION_LENGTH = 4
@@ -84,6 +84,18 @@ class MessageType:
         if name not in self._nested:
             self._nested[name] = MessageType(self._store, name)
         return self._nested[name]
+
+    def form(self, path: str) -> FieldDesc:
+        """Return the form of a field, `data` or `header.stamp.sec`; raise UsageError for what is none."""
+        owner: MessageType | None = self
+        for name in path.split("."):
+            fields = dict(owner.fields) if owner else {}
+            if name not in fields:
+                known = f"; there are {', '.join(fields)}" if fields else ""
+                raise UsageError(f"{self.name} has no field {path!r}{known}.")
+            form = fields[name]
+            owner = owner.nested(form[1]) if owner and form[0] == Nodetype.NAME else None
+        return form
 
     def check(self, message: object) -> None:
         """Raise UsageError for what is no message of this type, which may be that of another registry."""

@@ -131,3 +131,18 @@ def test_any_text_gives_a_profile_or_a_value_error(text: str) -> None:
     except ValueError:
         return
     assert QosProfile.decode(profile.encode()) == profile
+
+
+def test_a_profile_of_qos_is_made_of_its_policies() -> None:
+    for policies, told in {
+        ("reliability", "best_effort"): "Write Reliability.RELIABLE or Reliability.BEST_EFFORT.",
+        ("durability", 1): "Write Durability.TRANSIENT_LOCAL or Durability.VOLATILE.",
+        ("history", None): "Write History.KEEP_LAST or History.KEEP_ALL.",
+        ("liveliness", "automatic"): "Write Liveliness.AUTOMATIC or Liveliness.MANUAL_BY_TOPIC.",
+        ("depth", "10"): "Write a whole number.",
+        ("depth", 1.5): "Write a whole number.",
+    }.items():
+        name, value = policies
+        with pytest.raises(UsageError) as caught:
+            QosProfile(**{name: value})  # type: ignore[arg-type]
+        assert str(caught.value) == f"{name} is {value!r}. {told}"
