@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 from importlib import resources
 from pathlib import Path
 from typing import Annotated
@@ -25,6 +26,9 @@ from reconros_zenoh.errors import FileError, UsageError
 from reconros_zenoh.toml_file import TomlFile
 
 _FOLDER = Path(str(resources.files("reconros_zenoh.board"))) / "profiles"
+
+_UNKNOWN_KEY = "extra_forbidden"
+"""What pydantic calls it."""
 
 _NATIVE_BITSTREAM_SIZE = 4096
 """Where nothing is modelled a bitstream only has to exist."""
@@ -238,12 +242,18 @@ def read_profile(name_or_file: str) -> Profile:
     try:
         return Profile.model_validate(toml.content)
     except ValidationError as error:
-        first = error.errors()[0]
+        # A misspelt key is an unknown one and a missing one: the unknown one stands in the file.
+        first = min(error.errors(), key=lambda mistake: mistake["type"] != _UNKNOWN_KEY)
         place = [str(key) for key in first["loc"]]
         key = ".".join(place)
-        raise FileError(
-            path,
-            toml.line(place),
-            f"{key}: {first['msg']}.",
-            f"Correct {key}; the shipped profiles show every key.",
-        ) from None
+        problem, remedy = f"{first['msg']}.", f"Correct {key}; the shipped profiles show every key."
+        if first["type"] == _UNKNOWN_KEY:
+            problem = "there is no such key."
+            missing = [
+                str(mistake["loc"][-1])
+                for mistake in error.errors()
+                if mistake["type"] == "missing" and mistake["loc"][:-1] == first["loc"][:-1]
+            ]
+            if meant := difflib.get_close_matches(place[-1], missing, n=1):
+                remedy = f"Did you mean {meant[0]}?"
+        raise FileError(path, toml.line(place), f"{key}: {problem}", remedy) from None

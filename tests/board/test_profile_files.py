@@ -118,6 +118,13 @@ OSIF = '[model.osif]\ncall = { value = 10, unit = "us", basis = "assumed" }\n'
 
 # What is replaced by what, the text of the line that must be named, and what must be said.
 MISTAKES = {
+    "misspelt key": (
+        "hardware_poll =",
+        "hardware_pol =",
+        "hardware_pol =",
+        "model.executor.hardware_pol: there",
+    ),
+    "misspelt section": ("[model.icap]", "[model.icp]", "[model.icp]", "model.icp: there is no such key"),
     "not TOML": ("count = {", "count = = {", "count = = {", "is not TOML"),
     "not closed": ('name = "miniitx-zynq7100"', 'name = "miniitx', 'name = "miniitx', "is not TOML"),
     "section missing": (OSIF, "", "[model.cores]", "model.osif: Field required"),
@@ -194,20 +201,25 @@ MISTAKES = {
         "stalled_by_reconfiguration = true",
         "stalled_by_reconfiguration = true\ncolour = 3",
         "colour = 3",
-        "model.dds.colour: Extra inputs are not permitted",
+        "model.dds.colour: there is no such key",
     ),
-    "unknown section": (OSIF, OSIF + "[model.gpu]\ncores = 1\n", "[model.gpu]", "model.gpu: Extra inputs"),
+    "unknown section": (
+        OSIF,
+        OSIF + "[model.gpu]\ncores = 1\n",
+        "[model.gpu]",
+        "model.gpu: there is no such key",
+    ),
     "unknown key of a quantity": (
         'call = { value = 10, unit = "us"',
         'call = { value = 10, units = "us", unit = "us"',
         "call = {",
-        "model.osif.call.units: Extra inputs",
+        "model.osif.call.units: there is no such key",
     ),
     "unknown key of the file": (
         'description = "',
         'colour = "red"\ndescription = "',
         'colour = "red"',
-        "colour: Extra inputs",
+        "colour: there is no such key",
     ),
     "not a quantity": (
         'call = { value = 10, unit = "us", basis = "assumed" }',
@@ -259,6 +271,24 @@ def test_a_mistake_is_found_in_its_line(
     assert error.remedy
     lines = path.read_text().splitlines()
     assert (None if error.line is None else lines[error.line - 1][: len(place or "")]) == place
+
+
+@pytest.mark.parametrize(
+    ("right", "written", "remedy"),
+    [
+        ("hardware_poll =", "hardware_pol =", "Did you mean hardware_poll?"),
+        ("[model.icap]", "[model.icp]", "Did you mean icap?"),
+        ("[model.memif]", "[model.streams]", "Correct model.streams; the shipped profiles show every key."),
+    ],
+)
+def test_a_misspelt_key_is_told_what_it_may_have_been(
+    tmp_path: Path, right: str, written: str, remedy: str
+) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text(MINIITX.replace(right, written))
+    with pytest.raises(FileError) as caught:
+        read_profile(str(path))
+    assert caught.value.remedy == remedy
 
 
 def test_without_any_bitstream_size_a_model_is_of_no_use(tmp_path: Path) -> None:
