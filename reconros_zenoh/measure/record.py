@@ -122,13 +122,13 @@ def read_record(path: Path) -> Record:
 
     Reads the files of RecordWriter and any file of times in ms that are separated by `;`, `,` or line breaks,
     with an optional header word, as the authors of the paper logged them (`Periodic;`, `692.845;`, ...). All
-    values of such a file are kept, warm-up and totals too. Raises FileError, with the line, for anything
-    else.
+    values of such a file are kept, warm-up and totals too; `nan` is a lost request. Raises FileError, with
+    the line, for anything else.
     """
     lines = read_text_file(path, "Give a file of round-trip times in ms.", _LIMIT_BYTES).split("\n")
     if lines[0].strip() == HEADER:
         return _read_round_trips(path, lines)
-    return Record(path.stem, _read_values(path, lines))
+    return _read_values(path, lines)
 
 
 def find_records(folder: Path) -> list[Path]:
@@ -186,8 +186,9 @@ def _read_round_trips(path: Path, lines: list[str]) -> Record:
     return Record(path.stem, np.array(values, dtype=np.float64), lost=count["lost"], wrong=count["wrong"])
 
 
-def _read_values(path: Path, lines: list[str]) -> npt.NDArray[np.float64]:
+def _read_values(path: Path, lines: list[str]) -> Record:
     values: list[float] = []
+    lost = 0
     header = False
     separators: set[str] = set()
     for number, line in enumerate(lines, start=1):
@@ -206,16 +207,19 @@ def _read_values(path: Path, lines: list[str]) -> npt.NDArray[np.float64]:
                 raise FileError(
                     path, number, "a value is missing between two separators.", "Remove the empty field."
                 )
+            if token.lower() == "nan":
+                lost += 1
+                continue
             value = _milliseconds(path, number, token)
             if value is not None:
                 values.append(value)
-            elif values or header:
+            elif values or lost or header:
                 raise _not_a_time(path, number, token)
             else:
                 header = True
-    if not values:
+    if not values and not lost:
         raise FileError(path, None, "holds no times.", "Give a file of round-trip times in ms.")
-    return np.array(values, dtype=np.float64)
+    return Record(path.stem, np.array(values, dtype=np.float64), lost=lost)
 
 
 def _milliseconds(path: Path, number: int, token: str) -> float | None:

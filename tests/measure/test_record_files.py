@@ -74,6 +74,17 @@ def test_the_authors_format_is_read_with_warm_up_and_total(tmp_path):
     assert read_record(path).values_ms.tolist() == [692.845, 246.875, 250416.0]
 
 
+def test_a_nan_among_foreign_times_is_a_lost_request(tmp_path):
+    path = tmp_path / "times.csv"
+    path.write_text("nan\n12.5\nNaN\n7\n")
+    record = read_record(path)
+    assert record.values_ms.tolist() == [12.5, 7]
+    assert (record.lost, record.wrong) == (2, 0)
+    path.write_text("nan\nnan")
+    assert read_record(path).values_ms.size == 0
+    assert read_record(path).lost == 2
+
+
 def test_a_byte_order_mark_is_no_part_of_the_values(tmp_path):
     path = tmp_path / "a.csv"
     path.write_bytes(b"\xef\xbb\xbf1.5\n2\n")
@@ -92,7 +103,7 @@ def test_a_record_without_any_round_trip_is_empty(tmp_path):
         ("Sort;\n1.0;\nabc;\n2.0;", 3, "'abc'"),
         ("Sort;\nMore;\n1.0;", 2, "'More'"),
         ("1.0\n-2.0\n", 2, "'-2.0'"),
-        ("nan\n1.0\n", 1, "'nan'"),
+        ("inf\n1.0\n", 1, "'inf'"),
         ("1.0\ninf\n", 2, "'inf'"),
         ("1.0;;2.0\n", 1, "missing"),
         ("1.0\n2,5;\n", 2, "both"),
