@@ -17,8 +17,11 @@ from reconros_zenoh.board.endpoints import ServiceSource, SubscriptionSource, Ti
 from reconros_zenoh.board.executor import Executor
 from reconros_zenoh.board.profile import Profile, read_profile
 from reconros_zenoh.clock.virtual import VirtualEnvironment, succeed_once
+from reconros_zenoh.errors import UsageError
 from reconros_zenoh.project.loader import load_project
 from reconros_zenoh.rmw.node import Context
+from reconros_zenoh.ros.graph import EndpointKind, EndpointToken, parse, tokens_expression
+from reconros_zenoh.ros.names import resolve, type_name_of
 from reconros_zenoh.ros.types import TypeRegistry
 from reconros_zenoh.transport.simulated import SimulatedNetwork
 
@@ -75,8 +78,11 @@ class VirtualDesktop:
         """Return the time [ms] from each message to its answer; the next leaves when the answer is in.
 
         `requests` and `answers` are topic and type name; a message is given by its fields. An answer that
-        does not come within `limit_s` is NaN.
+        does not come within `limit_s` is NaN. Raises UsageError when nobody on the board hears the requests,
+        or nobody publishes answers.
         """
+        self._check_ends(EndpointKind.SUBSCRIPTION, *requests)
+        self._check_ends(EndpointKind.PUBLISHER, *answers)
         request_type = self.types.message(requests[1])
         publisher = self.desktop.publisher(request_type, requests[0])
         arrived = self.environment.event()
@@ -94,6 +100,30 @@ class VirtualDesktop:
         subscription.close()
         publisher.close()
         return np.array(times_ms)
+
+    def _check_ends(self, kind: EndpointKind, topic: str, type_name: str) -> None:
+        """Raise UsageError unless there is such an end of the topic, with this type."""
+        context = self.desktop.context
+        name, wanted = resolve(topic, "/", "desktop"), self.types.message(type_name)
+        hears = kind is EndpointKind.SUBSCRIPTION
+        found = [
+            token.dds_type
+            for token in map(parse, context.transport.tokens(tokens_expression(context.domain), 0))
+            if isinstance(token, EndpointToken)
+            and (token.kind, token.name) == (kind, name)
+            # Who listens on the desktop answers nothing.
+            and not (hears and token.zid == context.transport.session_id)
+        ]
+        if wanted.dds_name in found:
+            return
+        what = "hears" if hears else "publishes on"
+        if found:
+            types = " and ".join(sorted({type_name_of(dds_type) for dds_type in found}))
+            raise UsageError(f"who {what} {name} has the type {types}, not {wanted.name}. Use one type.")
+        remedy = "a callback with a subscription to it" if hears else "a publisher on it"
+        raise UsageError(
+            f"nobody on the board {what} {name}. Give the board {remedy}, and call spin() before this."
+        )
 
     def _context(self) -> Context:
         transport = self._network.transport(f"{next(self._sessions):x}")

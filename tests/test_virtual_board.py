@@ -45,6 +45,40 @@ def test_messages_go_to_the_board_and_come_back() -> None:
     assert board.status()["callbacks"]["double"]["calls"] == 3
 
 
+INT = "std_msgs/msg/Int32"
+
+
+@pytest.mark.parametrize(
+    ("requests", "answers", "told"),
+    [
+        (("/inn", WORD), ("/out", WORD), "nobody on the board hears /inn. Give the board a callback with a"),
+        (("/in", INT), ("/out", WORD), f"who hears /in has the type {WORD}, not {INT}. Use one type."),
+        (("/in", WORD), ("/ou", WORD), "nobody on the board publishes on /ou. Give the board a publisher"),
+        (("/in", WORD), ("/out", INT), f"who publishes on /out has the type {WORD}, not {INT}. Use one"),
+    ],
+)
+def test_round_trips_without_an_end_say_which(
+    requests: tuple[str, str], answers: tuple[str, str], told: str
+) -> None:
+    board = rz.VirtualBoard()
+    doubling(board)
+    board.listen("/inn", WORD)
+    with pytest.raises(rz.UsageError) as caught:
+        board.round_trips(requests, answers, numbers(2))
+    assert str(caught.value).startswith(told)
+    assert board.now_ms == 0
+
+
+def test_round_trips_before_the_board_spins() -> None:
+    board = rz.VirtualBoard()
+    source, writer = board.subscription("in", WORD), board.publisher("out", WORD)
+    board.executor.add_sw_callback("echo", rz.SUB, source, lambda msg, ctx: ctx.publish(writer, msg))
+    with pytest.raises(rz.UsageError, match=r"nobody on the board hears /in\. .* call spin\(\) before this"):
+        board.round_trips(("/in", WORD), ("/out", WORD), numbers(2))
+    board.executor.spin()
+    assert board.round_trips(("in", WORD), ("out", WORD), numbers(2)).tolist() == [0]
+
+
 def test_a_modelled_board_takes_its_time_and_repeats_itself() -> None:
     times = []
     for _ in range(2):

@@ -26,6 +26,11 @@ def dds_type_name(name: str) -> str:
     return f"{package}::{kind}::dds_::{type_name}_"
 
 
+def type_name_of(dds_name: str) -> str:
+    """Return the name of the type whose name on the wire is this: the reverse of `dds_type_name`."""
+    return dds_name.removesuffix("_").replace("::dds_::", "/").replace("::", "/")
+
+
 def mangle(name: str) -> str:
     """Return `name` as one part of a key: every `/` is a `%`, and the empty name stands for the root."""
     return name.replace("/", "%") or "%"

@@ -19,6 +19,7 @@ from reconros_zenoh.ros.names import (
     demangle,
     mangle,
     resolve,
+    type_name_of,
 )
 
 HASH = "RIHS01_df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18"
@@ -44,6 +45,7 @@ def test_data_key_keeps_inner_slashes() -> None:
 )
 def test_dds_type_name(name: str, dds_name: str) -> None:
     assert dds_type_name(name) == dds_name
+    assert type_name_of(dds_name) == name
 
 
 @pytest.mark.parametrize(
