@@ -137,7 +137,7 @@ def test_no_message_leaves_and_no_mutex_is_held(caplog: pytest.LogCaptureFixture
     case.run()
     assert case.executor.failures == {"a": 1}
     assert mutex.try_lock("somebody")
-    assert case.board.slots[0].busy_ns == 7
+    assert case.board.slots[0].busy.ns == 7
 
 
 @pytest.mark.parametrize("limit_ms", [None, 1000.0])
