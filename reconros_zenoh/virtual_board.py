@@ -160,12 +160,9 @@ class VirtualBoard(VirtualDesktop):
         )
         self._node = self.board.context.node(self.board.name)
 
-    def subscription(
-        self, topic: str, type_name: str, qos: QosProfile | None = None, *, in_hardware: bool = False
-    ) -> SubscriptionSource:
-        """Return a subscription of the board; `in_hardware` says that its callback runs in slots."""
-        message_type = self.types.message(type_name)
-        return SubscriptionSource(self.board, self._node, message_type, topic, qos, in_hardware=in_hardware)
+    def subscription(self, topic: str, type_name: str, qos: QosProfile | None = None) -> SubscriptionSource:
+        """Return a subscription of the board."""
+        return SubscriptionSource(self.board, self._node, self.types.message(type_name), topic, qos)
 
     def publisher(self, topic: str, type_name: str, qos: QosProfile | None = None) -> TopicWriter:
         """Return a publisher of the board."""

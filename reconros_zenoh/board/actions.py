@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, cast
 
 from reconros_zenoh.board.endpoints import Event, Source
@@ -15,8 +14,6 @@ from reconros_zenoh.rmw.action_server import ActionServer
 from reconros_zenoh.ros.message_arrays import snapshot
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from reconros_zenoh.board.board import Board
     from reconros_zenoh.board.stack_node import Arrived
     from reconros_zenoh.rmw.action_client import ActionEvent
@@ -24,7 +21,6 @@ if TYPE_CHECKING:
     from reconros_zenoh.rmw.node import Node
     from reconros_zenoh.rmw.received import Received
     from reconros_zenoh.ros.types import ActionType
-    from reconros_zenoh.transport.base import Parts
 
 _DEPTH = 10
 _ID_BYTES = 16
@@ -47,9 +43,8 @@ class ActionSource(Source):
         self._type = action_type
         self._name = name
 
-    def open(self, on_ready: Callable[[], None], check: Callable[[Any], None] | None) -> None:
+    def begin(self) -> None:
         """Serve."""
-        super().open(on_ready, check)
         self._server = ActionServer(self._node, self._type, self._name, self._on_goal, self._accept)
 
     def result(self, **fields: object) -> Any:
@@ -71,6 +66,10 @@ class ActionSource(Source):
         self._server.finish(event.message, response)
         self._board.spans.add(event.timeline)
 
+    def fail(self, event: Event, text: str) -> None:  # noqa: ARG002 - an aborted goal has no room for the reason
+        """Abort the goal."""
+        self._server.fail(event.message)
+
     def _accept(self, goal: Any) -> None:
         if len(self._queue) >= _DEPTH:
             self._dropped += 1
@@ -79,22 +78,7 @@ class ActionSource(Source):
             self._check(goal)
 
     def _on_goal(self, handle: GoalHandle, received: Received) -> None:
-        timeline = cast("Arrived", received).timeline
-        self.enqueue(Event(handle, timeline, _Failure(self._server, handle), lasting=True))
-
-
-@dataclass(frozen=True, slots=True)
-class _Failure:
-    """How a goal ends whose callback raised."""
-
-    server: ActionServer
-    handle: GoalHandle
-
-    def respond_encoded(self, parts: Parts) -> None:
-        """Do nothing: the result goes to those who asked for it."""
-
-    def fail(self, text: str) -> None:  # noqa: ARG002 - an aborted goal has no room for the reason
-        self.server.fail(self.handle)
+        self.enqueue(Event(handle, cast("Arrived", received).timeline, lasting=True))
 
 
 class ActionClientSource(Source):

@@ -30,6 +30,10 @@ if TYPE_CHECKING:
 _AGES_KEPT = 10_000
 
 
+def _nobody() -> None:
+    """Hear of events before there is a callback."""
+
+
 class Event(NamedTuple):
     """What a worker takes: the message of the callback (None for a timer) and its timeline so far.
 
@@ -63,21 +67,36 @@ class Source:
     def __init__(self, depth: int | None = None) -> None:
         self._queue: deque[Event] = deque(maxlen=depth)
         self._dropped = 0
-        self._on_ready: Callable[[], None] = lambda: None
+        self._on_ready: Callable[[], None] = _nobody
         self._check: Callable[[Any], None] | None = None
+        self.in_hardware = False
 
     @property
     def dropped(self) -> int:
         """How many events were lost, or pushed out by newer ones, before a worker took them."""
         return self._dropped
 
-    def open(self, on_ready: Callable[[], None], check: Callable[[Any], None] | None) -> None:
+    def open(
+        self,
+        on_ready: Callable[[], None],
+        check: Callable[[Any], None] | None = None,
+        *,
+        in_hardware: bool = False,
+    ) -> None:
         """Begin; `on_ready` is called by the event loop whenever an event has come.
 
-        `check` raises BadMessageError for a message that the callback cannot use.
+        `check` raises BadMessageError for a message that the callback cannot use. `in_hardware` says that
+        its callback may run in slots. Raises UsageError the second time: a source makes one callback ready.
         """
+        if self._on_ready is not _nobody:
+            raise UsageError("one source cannot make two callbacks ready. Give each a source of its own.")
         self._on_ready = on_ready
         self._check = check
+        self.in_hardware = in_hardware
+        self.begin()
+
+    def begin(self) -> None:
+        """Have events come from now on: what a source does when it is opened."""
 
     def is_ready(self) -> bool:
         """Tell whether an event waits."""
@@ -91,6 +110,9 @@ class Source:
 
     def answer(self, event: Event, response: object) -> None:
         """Pass on what the callback returned: nowhere, unless a source says otherwise."""
+
+    def fail(self, event: Event, text: str) -> None:
+        """Tell whoever waits for an answer that there is none, and why: nobody, as with `answer`."""
 
     def enqueue(self, event: Event) -> None:
         """Append an event; called by the event loop."""
@@ -180,7 +202,7 @@ class Reader(Source):
 class SubscriptionSource(Reader):
     """A subscription: ready while a message waits.
 
-    It discards what `own` does not let pass. `in_hardware` says that its callback runs in slots.
+    It discards what `own` does not let pass.
     """
 
     kind = CallbackKind.SUB
@@ -194,19 +216,18 @@ class SubscriptionSource(Reader):
         qos: QosProfile | None = None,
         *,
         own: PublisherFilter | None = None,
-        in_hardware: bool = False,
     ) -> None:
         self.qos = QosProfile.or_default(qos)
         super().__init__(board, message_type, self.qos)
-        self.in_hardware = in_hardware
         self._own = own
         self._node = node
         self._topic = topic
 
-    def open(self, on_ready: Callable[[], None], check: Callable[[Any], None] | None) -> None:
+    def begin(self) -> None:
         """Subscribe."""
-        super().open(on_ready, check)
-        subscription = self._node.subscription(self.message_type, self._topic, self.arrive, self.qos, check)
+        subscription = self._node.subscription(
+            self.message_type, self._topic, self.arrive, self.qos, self._check
+        )
         if self._board.topics is not None:
             self._board.topics.add_reader(subscription.key, self)
 
@@ -248,16 +269,20 @@ class ServiceSource(Reader):
         self._name = name
         self._writer = Writer(board, QosProfile())
 
-    def open(self, on_ready: Callable[[], None], check: Callable[[Any], None] | None) -> None:
+    def begin(self) -> None:
         """Serve."""
-        super().open(on_ready, check)
-        self._node.service(self._type, self._name, self.arrive, check)
+        self._node.service(self._type, self._name, self.arrive, self._check)
 
     def answer(self, event: Event, response: object) -> None:
         """Send the response to the client."""
         assert event.responder is not None
         parts = self._type.response.encode(response)
         self._writer.put(parts, event.timeline, partial(event.responder.respond_encoded, parts))
+
+    def fail(self, event: Event, text: str) -> None:
+        """Tell the client that there will be no response, and why."""
+        assert event.responder is not None
+        event.responder.fail(text)
 
 
 class TimerSource(Source):
@@ -275,9 +300,8 @@ class TimerSource(Source):
         self._board = board
         self._period_ns = period_ns
 
-    def open(self, on_ready: Callable[[], None], check: Callable[[Any], None] | None) -> None:
+    def begin(self) -> None:
         """Let the first period begin."""
-        super().open(on_ready, check)
         self._board.environment.process(self._run())
 
     def _run(self) -> Generator[simpy.Event, object, None]:

@@ -209,7 +209,9 @@ class Executor:
             ]
             registration = self._registrations[entry.name]
             check = registration.check and partial(_check_message, entry.name, registration.check)
-            registration.source.open(partial(self._became_ready, entry), check)
+            registration.source.open(
+                partial(self._became_ready, entry), check, in_hardware=bool(registration.slots)
+            )
 
     def select(self, worker: Worker, resource: int) -> Dispatch | None:
         """Return the callback that this worker must run now, its message taken, or None."""
@@ -240,8 +242,7 @@ class Executor:
                 spans or "0 ms",
                 exc_info=error,
             )
-        if event.responder is not None:
-            event.responder.fail(f"callback {name} failed: {error}")
+        self._registrations[name].source.fail(event, f"callback {name} failed: {error}")
         self._finish(dispatch)
 
     def statistics(self) -> dict[str, dict[str, object]]:
@@ -294,6 +295,8 @@ class Executor:
         registration = self._registrations.setdefault(name, _Registration(kind, source, check))
         if registration.source is not source:
             raise UsageError(f"callback {name!r} is registered already with another source.")
+        if (registration.kind, registration.check) != (kind, check):
+            raise UsageError(f"callback {name!r} is registered already with another kind or check.")
         return registration
 
     def _bitstream(self, slot_id: int, name: str) -> Bitstream:

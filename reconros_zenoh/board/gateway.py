@@ -51,7 +51,7 @@ class Gateway:
         self._smt_last = False
         self._writer = board.writer(node, topic.type, smt, qos, in_place=True)
         self._smt = SubscriptionSource(
-            board, node, topic.type, smt, qos, own=PublisherFilter(self._writer.gid), in_hardware=True
+            board, node, topic.type, smt, qos, own=PublisherFilter(self._writer.gid)
         )
         self._hmt = Fifo(FifoPlan(), self._wake, PublisherFilter(self), cut_through=True)
         self.name = node.name
@@ -65,7 +65,7 @@ class Gateway:
         self.late = 0
         self.refused = 0
         topic.subscribe(self._hmt)
-        self._smt.open(self._wake, None)
+        self._smt.open(self._wake, in_hardware=True)
         Activity(self._run(slot, bitstream))
 
     @property

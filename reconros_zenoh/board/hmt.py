@@ -261,9 +261,8 @@ class HmtSource(Source):
         """How many messages found the FIFO full."""
         return self._fifo.dropped
 
-    def open(self, on_ready: Callable[[], None], check: Callable[[Any], None] | None) -> None:
+    def begin(self) -> None:
         """Subscribe."""
-        super().open(on_ready, check)
         self._topic.subscribe(self._fifo)
 
     def is_ready(self) -> bool:

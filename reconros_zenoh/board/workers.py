@@ -11,6 +11,7 @@ from reconros_zenoh.board.host import measured
 from reconros_zenoh.board.software import SoftwareContext
 from reconros_zenoh.clock.activity import PARK, Activity, Signal, limited
 from reconros_zenoh.errors import CallbackError
+from reconros_zenoh.executor.callbacks import CallbackKind
 from reconros_zenoh.executor.resource_mask import SOFTWARE
 
 if TYPE_CHECKING:
@@ -166,7 +167,7 @@ class HardwareWorker(Worker):
                 raise
             if not_begun := thread.not_begun():
                 raise CallbackError(not_begun)
-            if event.responder is not None:
+            if dispatch.entry.kind is CallbackKind.SRV:
                 # Sending the response is a call through the delegate, as publishing is.
                 yield from board.osif.call()
                 timeline.mark("osif")

@@ -220,10 +220,12 @@ class _Rounds(Source):
         self._sw_ns: list[int] = []
         self.done = environment.event()
 
-    def open(self, on_ready: Callable[[], None], check: Callable[[Any], None] | None) -> None:
-        """Let the first round begin."""
-        super().open(on_ready, check)
-        self._begin()
+    def begin(self) -> None:
+        """Publish the next message."""
+        self._number += 1
+        self._got.clear()
+        self._environment.call_later(_LIMIT_NS, self._give_up, self._number)
+        self.enqueue(Event(None, Timeline(self._environment, self._environment.now)))
 
     def note(self, name: str, number: int, transmission_ns: int) -> None:
         """Note when a subscriber had its copy; callable from any thread."""
@@ -232,12 +234,6 @@ class _Rounds(Source):
     def times(self) -> Times:
         """Return the means."""
         return Times(statistics.fmean(self._hw_ns) / 1e6, statistics.fmean(self._sw_ns) / 1e6)
-
-    def _begin(self) -> None:
-        self._number += 1
-        self._got.clear()
-        self._environment.call_later(_LIMIT_NS, self._give_up, self._number)
-        self.enqueue(Event(None, Timeline(self._environment, self._environment.now)))
 
     def _note(self, name: str, number: int, transmission_ns: int) -> None:
         if number != self._number or name in self._got:
@@ -252,7 +248,7 @@ class _Rounds(Source):
         if self._number == self._last:
             succeed_once(self.done)
         else:
-            self._environment.call_later(_PAUSE_NS, self._begin)
+            self._environment.call_later(_PAUSE_NS, self.begin)
 
     def _give_up(self, number: int) -> None:
         if number == self._number:

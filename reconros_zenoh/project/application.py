@@ -91,7 +91,7 @@ class Application:
         if resource.hardware_mapped:
             return HmtSource(self.board, self._hardware_topic(resource), resource.fifo)
         end = self._end(resource, self.types.message)
-        return SubscriptionSource(self.board, *end, qos, in_hardware=self._in_hardware(resource))
+        return SubscriptionSource(self.board, *end, qos)
 
     def client(self, group: str, name: str) -> ClientSource:
         """Return the service client of that name, the same one each time."""
@@ -274,14 +274,6 @@ class Application:
                 f"{self.project.configuration.path} has no resource {name!r} in a group {group!r}. "
                 f"It has {known}."
             ) from None
-
-    def _in_hardware(self, resource: Resource) -> bool:
-        """Tell whether a callback that uses the resource may run in a slot."""
-        return any(
-            self.mapping.callbacks[thread.name].slots
-            for thread in self.project.configuration.threads
-            if resource.group in thread.resource_groups
-        )
 
     def _hardware_topic(self, resource: Resource) -> HardwareTopic:
         self._node(_required(resource.node))  # of a stream nothing is in the network, but its node is

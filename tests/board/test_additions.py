@@ -189,3 +189,23 @@ def test_a_kernel_publishes_on_a_stream() -> None:
     case = Case()
     writer = HmtWriter(case.board.hardware_topic("/o", WORD))
     case.add("subscription", SUB, Kernel(np.sum, ("data",), lambda _, __: None, writer))
+
+
+def test_a_callback_in_two_places_has_one_kind_and_one_check() -> None:
+    board = small_board(small_profile({"a": (10, 10)}), 1)
+    executor = Executor(board, 1, 1)
+    source = Tickets(board)
+    executor.add_sw_callback("a", SUB, source, ignore)
+    for kind, check in ((SRV, None), (SUB, ignore)):
+        with pytest.raises(UsageError, match="'a' is registered already with another kind or check"):
+            executor.add_hw_callback("a", [0], kind, source, logging_thread([], "a"), check)
+
+
+def test_a_source_makes_one_callback_ready() -> None:
+    board = small_board(small_profile(dict.fromkeys("ab", (10, 10))))
+    executor = Executor(board, 1, 0)
+    source = Tickets(board)
+    for name in "ab":
+        executor.add_sw_callback(name, SUB, source, ignore)
+    with pytest.raises(UsageError, match="one source cannot make two callbacks ready"):
+        executor.spin()

@@ -28,7 +28,7 @@ def received(
     """A source to which so many messages came."""
     board = small_board(profile)
     source = SubscriptionSource(board, board.context.node("reader"), message_type, "in", qos)
-    source.open(lambda: None, None)
+    source.open(lambda: None)
     publisher = desktop(board).node("client").publisher(message_type, "in")
     for _ in range(count):
         publisher.publish(message)

@@ -82,7 +82,7 @@ def test_the_columns_of_a_chain_add_up_to_the_round_trip() -> None:
     board = chain_board(2)
     node, executor = board.context.node("n"), Executor(board, 2, 2)
     stream = board.hardware_topic("/stream", WORD)
-    source = SubscriptionSource(board, node, WORD, "/in", in_hardware=True)
+    source = SubscriptionSource(board, node, WORD, "/in")
     executor.add_hw_callback("first", [0], SUB, source, relay(HmtWriter(stream)))
     second = HmtSource(board, stream, FifoPlan())
     executor.add_hw_callback("second", [1], SUB, second, relay(board.writer(node, WORD, "/local")))
@@ -112,7 +112,7 @@ def test_a_gateway_has_a_column_of_its_own_on_the_way(inwards: bool) -> None:
         writer = board.writer(node, WORD, "/out")
         executor.add_hw_callback("first", [0], SUB, HmtSource(board, stream, FifoPlan()), relay(writer))
     else:
-        source = SubscriptionSource(board, node, WORD, "/in", in_hardware=True)
+        source = SubscriptionSource(board, node, WORD, "/in")
         executor.add_hw_callback("first", [0], SUB, source, relay(HmtWriter(stream)))
     board.add_gateway("bridge", hmt, smt, WORD, 2)
     executor.spin()

@@ -363,7 +363,7 @@ def test_a_check_that_fails_itself_refuses_the_message_and_harms_nobody(
         source = (
             HmtSource(board, topic, FifoPlan())
             if way.startswith("stream")
-            else SubscriptionSource(board, node, BYTES, "/a", in_hardware=True)
+            else SubscriptionSource(board, node, BYTES, "/a")
         )
         executor.add_hw_callback(
             name, [slot], CallbackKind.SUB, source, listen(name), check if name == "picky" else None

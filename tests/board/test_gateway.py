@@ -74,7 +74,7 @@ class Side:
             event = source.take()
             self.software.append((self.environment.now, event.message))
 
-        source.open(note, None)
+        source.open(note)
         self.writer = board.writer(self.node, words, "/a")
         self.gateway = board.add_gateway("bridge", "/a", "/a", words, 0, qos)
 

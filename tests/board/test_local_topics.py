@@ -55,7 +55,7 @@ class Setup:
         self.got: dict[str, list[tuple[int, Any]]] = {name: [] for name in [*names, "s"]}
         executor = Executor(self.board, 1, hardware)
         for slot, name in enumerate(names):
-            source = SubscriptionSource(self.board, self.node, words, "/a", in_hardware=True)
+            source = SubscriptionSource(self.board, self.node, words, "/a")
             executor.add_hw_callback(name, [slot], CallbackKind.SUB, source, self.hardware(name))
         self.software = SubscriptionSource(self.board, self.node, words, "/a")
         executor.add_sw_callback(
@@ -190,7 +190,7 @@ def test_messages_from_elsewhere_still_come_through_the_stack() -> None:
 def test_filter_and_check_hold_for_messages_of_the_board() -> None:
     setup = Setup(0)
     own = SubscriptionSource(setup.board, setup.node, words, "/a", own=PublisherFilter(setup.writer.gid))
-    own.open(lambda: None, None)
+    own.open(lambda: None)
 
     def check(_: Any) -> None:
         raise BadMessageError("image_size", "too small")
@@ -205,7 +205,7 @@ def test_filter_and_check_hold_for_messages_of_the_board() -> None:
 def test_a_reader_that_is_too_slow_keeps_the_last() -> None:
     setup = Setup(0)
     lazy = SubscriptionSource(setup.board, setup.node, words, "/a")
-    lazy.open(lambda: None, None)
+    lazy.open(lambda: None)
     for _ in range(12):
         setup.publish(hardware=False)
     assert lazy.dropped == 2
@@ -228,10 +228,10 @@ class Late:
         for number in range(5):
             self.publish(number)
             self.environment.run()
-        self.source = SubscriptionSource(self.board, node, words, "/a", reader, in_hardware=to_hardware)
+        self.source = SubscriptionSource(self.board, node, words, "/a", reader)
         self.started_ns = self.environment.now
         self.got: list[tuple[int, int]] = []
-        self.source.open(self.note, None)
+        self.source.open(self.note, in_hardware=to_hardware)
 
     def publish(self, number: int) -> None:
         body = words.cls(layout=layout, data=np.full(U, number, np.uint8))

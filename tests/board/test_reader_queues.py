@@ -76,7 +76,7 @@ def test_the_time_of_a_message_counts_from_its_source_timestamp() -> None:
     board = small_board(small_profile({"a": (1000, 0)}, link_ns=500))
     word = types().message("std_msgs/msg/UInt32")
     source = SubscriptionSource(board, board.context.node("server"), word, "in")
-    source.open(lambda: None, None)
+    source.open(lambda: None)
     sender = desktop(board)
     sender.clock_ns = lambda: board.environment.now - 300  # it was on its way for 300 ns
     publisher = sender.node("client").publisher(word, "in")
@@ -217,7 +217,7 @@ def test_expiries_that_nobody_took_merge_into_one_and_are_counted() -> None:
 def test_the_time_of_merged_expiries_counts_from_the_first() -> None:
     board = small_board(small_profile())
     timer = TimerSource(board, 1000)
-    timer.open(lambda: None, None)
+    timer.open(lambda: None)
     board.environment.run(until=2500)
     event = timer.take()
     assert event.timeline.started_ns == 1000

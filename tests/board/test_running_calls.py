@@ -60,7 +60,7 @@ def test_a_call_that_found_room_waits_for_nothing_any_more() -> None:
     executor = Executor(board, 0, 1)
     stream = board.hardware_topic("/x", WORD)
     reader = HmtSource(board, stream, FifoPlan(depth=1))
-    reader.open(lambda: None, None)
+    reader.open(lambda: None)
     source, writer = Tickets(board), HmtWriter(stream)
 
     def count(thread: HardwareThread) -> Steps:

@@ -110,7 +110,7 @@ def test_endpoints_are_in_the_namespace_of_their_node(app: Application) -> None:
     assert app.client("ros", "ask")._client.name == "/robot/flip"
     app.action_client("ros", "want")
     source = app.source("ros", "act")
-    source.open(lambda: None, None)
+    source.open(lambda: None)
     app.parameters("ros", "node").declare("speed", 1)
     tokens = app.board.context.transport.tokens("@ros2_lv/**", 0)
     for name in ("%robot%serve%_action%send_goal", "%robot%want%_action%get_result"):
@@ -133,7 +133,7 @@ def test_what_a_node_sends_for_its_parameters_and_actions_is_no_message_of_a_cal
     app.parameters("ros", "node").declare("speed", 1)
     app.board.environment.run(until=1)
     assert app.board.spans.mean_ms().keys() == {"/robot/arm"}
-    app.source("ros", "act").open(lambda: None, None)
+    app.source("ros", "act").open(lambda: None)
     client = ActionClient(app.board.context.node("other"), _fibonacci(app), "/robot/serve", lambda _: None)
     app.board.environment.run(until=2)
     client.send_goal(_fibonacci(app).goal.cls(order=1), client.new_goal_id())
@@ -148,7 +148,7 @@ def _fibonacci(app: Application) -> ActionType:
 def test_the_qos_of_a_topic_is_chosen_that_of_others_is_fixed(app: Application) -> None:
     qos = QosProfile(Reliability.BEST_EFFORT, depth=1)
     source = app.source("ros", "sub", qos)
-    source.open(lambda: None, None)
+    source.open(lambda: None)
     app.writer("ros", "pub", qos)
     tokens = app.board.context.transport.tokens("@ros2_lv/**", 0)
     assert sum(token.endswith(f"/{qos.encode()}") for token in tokens) == 2
