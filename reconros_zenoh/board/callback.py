@@ -37,6 +37,7 @@ if TYPE_CHECKING:
 
 R = TypeVar("R")
 Array: TypeAlias = "np.ndarray[Any, Any]"
+_MOST_STEPS = 100
 
 HardwareCallback: TypeAlias = "Callable[[HardwareThread], Generator[Awaitable, object, object]]"
 """A generator; a service server's callback returns the response."""
@@ -148,6 +149,7 @@ class HardwareThread(DelegateCalls):
         self._slot = slot
         self._time = implementation.time
         self._limit = implementation.limit
+        self._computations = 0
         self.sequence_number = event.sequence_number
         self._in_slot = event.in_slot
         self._message = (
@@ -232,7 +234,8 @@ class HardwareThread(DelegateCalls):
         host = self._board.host
         if self._time.ns is None and self._time.modelled:
             return (yield from self._compute_as_measured(kernel, *arguments))
-        future = host.start(kernel, partial(host.compute, kernel, *arguments), limit=self._limit)
+        task = partial(host.compute, kernel, *arguments)
+        future = host.start(self._next_step(), task, limit=self._limit)
         if self._time.ns is None:
             result: R = yield from host.result(future)
             self._timeline.mark("execution")
@@ -314,12 +317,20 @@ class HardwareThread(DelegateCalls):
     ) -> Generator[Awaitable, object, R]:
         host, started_ns = self._board.host, self._environment.now
         task = partial(host.compute, measured, kernel, *arguments)
-        future = host.start(kernel, task, limit=self._limit)
+        future = host.start(self._next_step(), task, limit=self._limit)
         result: R
         result, took_ns = yield from host.result(future)
         yield from host.until(started_ns + round(took_ns * self._time.factor))
         self._timeline.mark("execution")
         return result
+
+    def _next_step(self) -> tuple[str, int]:
+        """Return the task of the next computation; its kernel may be a new object in each call.
+
+        Those after the hundredth of a call are one task, because a callback may go on for ever.
+        """
+        self._computations = min(self._computations + 1, _MOST_STEPS)
+        return self._callback, self._computations
 
     def _in_memory(self, init: InitData) -> Any:
         try:

@@ -17,7 +17,7 @@ from reconros_zenoh.errors import CallbackLimitError
 from reconros_zenoh.ros.message_arrays import snapshot
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Generator
+    from collections.abc import Callable, Generator, Hashable
 
     from reconros_zenoh.clock.activity import Awaitable
     from reconros_zenoh.clock.virtual import VirtualEnvironment
@@ -96,16 +96,17 @@ class Host:
         # What is expected to take less runs in line: it holds up the event loop that long.
         self._in_line_ns = _IN_LINE_NS if modelled else 10 * _IN_LINE_NS
         self._pool = None if threads is None else ThreadPool(threads, "computation")
-        self._expected_ns: dict[object, float] = {}
+        self._expected_ns: dict[Hashable, float] = {}
         self._of_constants = _Results(_CONSTANTS_KEPT) if modelled else None
         self.overruns = Overruns()
 
     def start(
-        self, task: object, function: Callable[..., R], *arguments: object, limit: Limit | None = None
+        self, task: Hashable, function: Callable[..., R], *arguments: object, limit: Limit | None = None
     ) -> Future[R] | _Done[R]:
         """Start a computation and return its future; `task` names what tends to take equally long.
 
-        A task of None may take any time, because it waits for others: it never holds up the event loop.
+        It is remembered for ever, so it must not be a new one with each message. A task of None may take any
+        time, because it waits for others: it never holds up the event loop.
 
         With a limit it has a thread of its own, which nobody waits for longer: in virtual time the limit is
         one of this host's time as well, and its error stands in for the result.
@@ -184,7 +185,7 @@ class Host:
         if self._pool is not None:
             self._pool.close()
 
-    def _timed(self, task: object, function: Callable[..., R], *arguments: object) -> R:
+    def _timed(self, task: Hashable, function: Callable[..., R], *arguments: object) -> R:
         started_ns = time.perf_counter_ns()
         try:
             return function(*arguments)

@@ -106,7 +106,7 @@ class SoftwareWorker(Worker):
         context = SoftwareContext(board, dispatch.entry.name, implementation.time, event.sequence_number)
         try:
             response = yield from self._within(
-                implementation.limit, self._run_function(implementation, event, context)
+                implementation.limit, self._run_function(dispatch.entry.name, implementation, event, context)
             )
         finally:
             context.release_mutexes()
@@ -115,11 +115,11 @@ class SoftwareWorker(Worker):
         return response
 
     def _run_function(
-        self, implementation: SoftwareImplementation, event: Event, context: SoftwareContext
+        self, name: str, implementation: SoftwareImplementation, event: Event, context: SoftwareContext
     ) -> Generator[Awaitable, object, object]:
         board, timeline, time = self._board, event.timeline, implementation.time
         function, limit, host = implementation.function, implementation.limit, self._board.host
-        task = None if event.lasting else function
+        task = None if event.lasting else name
         if time.ns is not None:
             future = host.start(task, function, event.message, context, limit=limit)
             yield from board.cpu.run(time.ns)
