@@ -33,17 +33,24 @@ def read_text_file(path: Path, remedy: str = _REMEDY, limit_bytes: int = _LIMIT_
 
 def read_old_text_file(path: Path, warnings: list[str]) -> str:
     """Return the text like `read_text_file`; what is not UTF-8 is read as Windows-1252, with a warning."""
+    content, encoding = read_old_bytes(path, warnings)
+    return _unified(content.decode(encoding, errors="replace").removeprefix("\ufeff"))
+
+
+def read_old_bytes(path: Path, warnings: list[str]) -> tuple[bytes, str]:
+    """Return what is in a text file and its encoding: UTF-8, or Windows-1252 with a warning."""
     content = _read(path, _REMEDY, _LIMIT_BYTES)
     zero = content.find(b"\0")
     if zero >= 0:
         raise FileError(path, _line(content, zero), "The file is no text.", "Save it as UTF-8.")
     try:
-        return _unified(content.decode("utf-8-sig"))
+        content.decode()
     except UnicodeDecodeError as error:
         warnings.append(
             f"{path}:{_line(content, error.start)}: this is not UTF-8; it is read as Windows-1252."
         )
-        return _unified(content.decode("cp1252", errors="replace"))
+        return content, "cp1252"
+    return content, "utf-8"
 
 
 def check_file(path: Path, remedy: str, limit_bytes: int) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import shutil
 from collections import defaultdict
+from io import StringIO
 from itertools import count
 from typing import TYPE_CHECKING
 
@@ -13,6 +14,7 @@ from reconros_zenoh.mapping.communication import TopicMapping, topics_of
 from reconros_zenoh.mapping.graph import Side
 from reconros_zenoh.mapping.project_graph import TopicEnd, gateway_topics, topic_ends
 from reconros_zenoh.project.ini import read_sections
+from reconros_zenoh.text_file import read_old_bytes
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
@@ -31,9 +33,9 @@ def apply_mapping(
     """Write the mapping of topics into the project file; return what was changed, nothing if all is there.
 
     The ends in hardware of topics in T_HW and T_GW become hardware-mapped, and each topic in T_GW gets a
-    gateway, in a slot that no thread and no other gateway names. Every other byte of the file stays, and so
-    does what is hardware-mapped already. The file is replaced as a whole or not at all. FileError names the
-    line of what cannot be changed.
+    gateway, in a slot that no thread and no other gateway names. Every other byte of the file stays, its
+    encoding, and what is hardware-mapped already. The file is replaced as a whole or not at all. FileError
+    names the line of what cannot be changed.
     """
     path = configuration.path
     ends = [
@@ -42,8 +44,8 @@ def apply_mapping(
         if mappings[end.topic] is not TopicMapping.SOFTWARE
     ]
     _check_types(path, ends)
-    with path.open(encoding="utf-8", newline="") as file:  # line ends as they are
-        lines = list(file)
+    content, encoding = read_old_bytes(path, [])
+    lines = list(StringIO(content.decode(encoding, "surrogateescape"), newline=""))  # line ends as they are
     changes = []
     for option, value in _switched(configuration, ends):
         start, equals, _ = lines[option.line - 1].partition("=")
@@ -58,7 +60,7 @@ def apply_mapping(
         lines += [f"{line}{_line_end(lines[0])}" for line in ("", *section)]
         changes.append(f"added: {', '.join(section)}")
     if changes:
-        _replace(path.resolve(), "".join(lines))
+        _replace(path.resolve(), "".join(lines), encoding)
     return changes
 
 
@@ -156,12 +158,16 @@ def _line_end(line: str) -> str:
     return line[len(line.rstrip("\r\n")) :]
 
 
-def _replace(path: Path, text: str) -> None:
+def _replace(path: Path, text: str, encoding: str) -> None:
     partial = path.with_name(f"{path.name}.partial")
     try:
-        partial.write_text(text, encoding="utf-8", newline="")
+        partial.write_text(text, encoding=encoding, errors="surrogateescape", newline="")
         shutil.copymode(path, partial)
         partial.replace(path)
+    except UnicodeEncodeError as error:
+        raise UsageError(
+            f"{path}: {error.object[error.start]!r} cannot be written in {encoding}. Save the file as UTF-8."
+        ) from None
     except OSError as error:
         raise UsageError(f"{path} cannot be written ({error.strerror}). Check its permissions.") from None
     finally:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING
 
 import pytest
 from camera_project import CAMERA, gateway, read, write
 
-from reconros_zenoh.errors import FileError
+from reconros_zenoh.errors import FileError, UsageError
 from reconros_zenoh.mapping.apply import apply_mapping
 from reconros_zenoh.mapping.communication import map_topics
 from reconros_zenoh.mapping.project_graph import read_project_graph
@@ -86,6 +87,26 @@ def test_line_ends_stay_as_they_are(tmp_path: Path, end: str) -> None:
     path = write(tmp_path, CAMERA.replace("\n", end))
     apply_rule(path)
     assert path.read_bytes().decode() == APPLIED.replace("\n", end)
+
+
+def test_a_file_in_windows_1252_stays_in_it(tmp_path: Path) -> None:
+    def old(text: str) -> bytes:
+        # The byte 81 is no character; it was one in DOS.
+        return re.sub(r"\bnode\b", "nœud", text).encode("cp1252").replace(b"# A", b"# F\x81r die")
+
+    path = tmp_path / "build.cfg"
+    path.write_bytes(old(CAMERA))
+    apply_rule(path)
+    assert path.read_bytes() == old(APPLIED)
+
+
+def test_a_name_that_is_in_no_encoding_is_refused_in_one_line(tmp_path: Path) -> None:
+    path = tmp_path / "build.cfg"
+    before = re.sub(r"\bnode\b", "n_de", CAMERA).encode().replace(b"n_de", b"n\x81de")
+    path.write_bytes(before)
+    with pytest.raises(UsageError, match="cannot be written in cp1252"):
+        apply_rule(path)
+    assert path.read_bytes() == before
 
 
 def test_a_file_without_a_last_line_end(tmp_path: Path) -> None:
