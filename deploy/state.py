@@ -7,6 +7,7 @@ import hashlib
 import json
 import os
 import signal
+import struct
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -16,14 +17,19 @@ from reconros_zenoh.errors import FileError, UsageError
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
+    from typing import BinaryIO
+
+# <fcntl.h> of Linux: l_type, l_whence, l_start, l_len, l_pid of a struct flock
+_FLOCK = "hhqqi0q"
+# The bytes of `lock` that are locked by who runs the deployment and by who stops it
+_RUNS, _STOPS = 0, 1
 
 
 @dataclass(frozen=True, slots=True)
 class Record:
-    """What runs, the process that runs it, the states in which it left the services, and what went wrong."""
+    """What runs, the states in which its services were left, and what went wrong."""
 
     file: str
-    pid: int
     states: Mapping[str, str]
     error: str
 
@@ -32,8 +38,9 @@ class StateFolder:
     """The folder of one Compose file below `$XDG_STATE_HOME/reconros` (default `~/.local/state/reconros`).
 
     `lock` is locked for as long as the deployment runs: the kernel gives it free however its owner ends, so a
-    stale folder cannot be taken for a running deployment, nor a reused process number for its owner. `record`
-    says whom to ask to stop. `logs` has the logs of the last run.
+    stale folder cannot be taken for a running deployment, and says who the owner is, so that nobody else is
+    asked to stop. (A POSIX lock: an owner that opens and closes the file once more loses it.) `record` says
+    how the deployment was left. `logs` has the logs of the last run.
     """
 
     def __init__(self, compose_file: Path, environment: Mapping[str, str]) -> None:
@@ -60,7 +67,7 @@ class StateFolder:
         self.make()
         with self._lock.open("ab") as lock:
             try:
-                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                fcntl.lockf(lock, fcntl.LOCK_EX | fcntl.LOCK_NB, 1, _RUNS)
             except BlockingIOError:
                 raise UsageError(
                     f"{self._compose_file} is up already; its logs are in {self.logs}. "
@@ -72,7 +79,7 @@ class StateFolder:
 
     def leave(self, states: Mapping[str, str], error: str) -> None:
         """Record how the owner, this process, leaves the deployment."""
-        record = Record(str(self._compose_file.resolve()), os.getpid(), states, error)
+        record = Record(str(self._compose_file.resolve()), states, error)
         new = self._record.with_suffix(".new")
         new.write_text(json.dumps(asdict(record)), encoding="utf-8")
         new.replace(self._record)  # at once, so that nobody reads half a record
@@ -80,28 +87,35 @@ class StateFolder:
     def end_owner(self) -> Record | None:
         """Stop the deployment if it is running; return its last record and forget it.
 
-        None means that there is nothing to stop and nothing to tell.
+        None means that there is nothing to stop and nothing to tell. Raise UsageError when it runs elsewhere.
         """
-        if not self._record.exists():
+        try:
+            with self._lock.open("r+b") as lock:
+                # One after another: the owner takes a second signal for one of a user in a hurry.
+                fcntl.lockf(lock, fcntl.LOCK_EX, 1, _STOPS)
+                owner = _owner(lock)
+                if owner is not None:
+                    if owner <= 0:
+                        raise UsageError(
+                            f"{self._compose_file} is up on another host or in a container. Stop it there."
+                        )
+                    with suppress(ProcessLookupError):  # it has just ended by itself
+                        os.kill(owner, signal.SIGTERM)
+                # The owner lets go when everything has stopped. Shared: this process owns nothing.
+                fcntl.lockf(lock, fcntl.LOCK_SH, 1, _RUNS)
+                record = _read(self._record)
+                self._record.unlink()
+                return record
+        except FileNotFoundError:  # it was never up, or another `down` has told of it
             return None
-        with self._lock.open("ab") as lock:
-            try:
-                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError:
-                with suppress(ProcessLookupError):  # it has just ended by itself
-                    os.kill(_read(self._record).pid, signal.SIGTERM)
-                fcntl.flock(lock, fcntl.LOCK_EX)  # the owner lets go when everything has stopped
-            record = _read(self._record)
-            self._record.unlink()
-            return record
 
 
 def running(environment: Mapping[str, str]) -> list[Path]:
     """Return the Compose files whose deployments this user has running."""
     files = []
     for record in _home(environment).glob("*/record.json"):
-        if _is_locked(record.with_name("lock")):
-            with suppress(FileNotFoundError):  # it has just ended, and another `down` has told of it
+        with suppress(FileNotFoundError), record.with_name("lock").open("rb") as lock:
+            if _owner(lock) is not None:
                 files.append(Path(_read(record).file))
     return sorted(files)
 
@@ -111,14 +125,14 @@ def _home(environment: Mapping[str, str]) -> Path:
     return Path(home) / "reconros"
 
 
-def _is_locked(path: Path) -> bool:
-    with path.open("ab") as lock:
-        try:
-            # Shared: two that look at the same time must not take each other for an owner.
-            fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
-        except BlockingIOError:
-            return True
-    return False
+def _owner(lock: BinaryIO) -> int | None:
+    """Return the process that runs the deployment, 0 or less for one elsewhere, or None.
+
+    What waits for its end is not taken for it: that has a shared lock.
+    """
+    asked = struct.pack(_FLOCK, fcntl.F_RDLCK, os.SEEK_SET, _RUNS, 1, 0)
+    kind, *_, process = struct.unpack(_FLOCK, fcntl.fcntl(lock, fcntl.F_GETLK, asked))
+    return None if kind == fcntl.F_UNLCK else process
 
 
 def _read(record: Path) -> Record:

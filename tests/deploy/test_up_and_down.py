@@ -199,7 +199,8 @@ def test_down_without_a_file_stops_the_one_that_is_running(
 def test_a_record_of_another_version_is_named(services: Services, run: Run, tmp_path: Path) -> None:
     _server_and(services, "block()")
     folder = StateFolder(services.folder / "compose.yaml", {"XDG_STATE_HOME": str(tmp_path / "state")})
-    folder.make()
+    with folder.claimed():
+        pass
     record = folder.path / "record.json"
     record.write_text('{"pid": 1, "states": {}, "error": ""}')
     down = run("down")
