@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -13,7 +14,7 @@ from reconros_zenoh.ros.qos import QosProfile
 from reconros_zenoh.ros.zero_message import zero_message
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Sequence
 
     from reconros_zenoh.rmw.ends import NodeEnds
     from reconros_zenoh.rmw.received import Received
@@ -57,7 +58,8 @@ class Parameters:
 
     def __init__(self, node: NodeEnds, types: TypeRegistry) -> None:
         self._parameters: dict[str, _Parameter] = {}
-        self._lock = threading.Lock()
+        self._lock = threading.RLock()
+        self._is_changing = False
         self._value_type = types.message("rcl_interfaces/msg/ParameterValue")
         self._descriptor_type = types.message("rcl_interfaces/msg/ParameterDescriptor")
         self._result_type = types.message("rcl_interfaces/msg/SetParametersResult")
@@ -90,10 +92,11 @@ class Parameters:
     ) -> None:
         """Declare a parameter with its first value.
 
-        `on_set` is called with each new value before it is taken over; its UsageError refuses the value.
+        `on_set` is called with each new value before it is taken over; its UsageError refuses the value. It
+        cannot declare or set parameters itself, which raises one.
         """
         _kind(name, value)
-        with self._lock:
+        with self._changing():
             if name in self._parameters:
                 raise UsageError(f"parameter {name!r} is declared already.")
             self._parameters[name] = _Parameter(value, description, on_set)
@@ -106,11 +109,23 @@ class Parameters:
 
     def set(self, name: str, value: Value) -> None:
         """Give a declared parameter a new value; raise UsageError when it is refused."""
-        with self._lock:
+        with self._changing():
             self._check(name, value)
             self._parameters[name].value = value
             event = self._event([], [name])
         self._events.publish(event)
+
+    @contextmanager
+    def _changing(self) -> Iterator[None]:
+        """Keep others from changing parameters; raise UsageError within `on_set`, as rclcpp does."""
+        with self._lock:
+            if self._is_changing:
+                raise UsageError("on_set cannot declare or set a parameter. Do it when on_set has returned.")
+            self._is_changing = True
+            try:
+                yield
+            finally:
+                self._is_changing = False
 
     def _check(self, name: str, value: Value) -> None:
         parameter = self._declared(name)
@@ -167,17 +182,17 @@ class Parameters:
     def _result(self, parameters: Sequence[Any]) -> Any:
         """Set all of the parameters or none; return which, and why."""
         result = zero_message(self._result_type)
-        with self._lock:
-            try:
+        try:
+            with self._changing():
                 values = {parameter.name: _value(parameter) for parameter in parameters}
                 for name, value in values.items():
                     self._check(name, value)
-            except UsageError as error:
-                result.reason = str(error)
-                return result
-            for name, value in values.items():
-                self._parameters[name].value = value
-            event = self._event([], values)
+                for name, value in values.items():
+                    self._parameters[name].value = value
+                event = self._event([], values)
+        except UsageError as error:
+            result.reason = str(error)
+            return result
         # Not with the lock held: who hears it may be in this session and set a parameter in turn.
         if values:
             self._events.publish(event)

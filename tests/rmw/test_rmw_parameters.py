@@ -132,6 +132,23 @@ def test_a_callback_may_refuse_a_value() -> None:
         remote.parameters.set("count", -5)
 
 
+def test_a_callback_that_changes_parameters_itself_refuses_the_value() -> None:
+    remote = Remote()
+    parameters = remote.parameters
+    parameters.declare("other", 1)
+    parameters.declare("setting", 1, lambda value: parameters.set("other", value))
+    parameters.declare("declaring", 1, lambda value: parameters.declare("new", value))
+    for name in ("setting", "declaring"):
+        with pytest.raises(UsageError, match="on_set cannot declare or set a parameter"):
+            parameters.set(name, 2)
+    refused = remote.set("SetParametersAtomically", other=3, setting=3).result
+    assert not refused.successful
+    assert "on_set cannot" in refused.reason
+    assert [parameters.get(name) for name in ("other", "setting", "declaring")] == [1, 1, 1]
+    parameters.set("other", 4)
+    assert parameters.get("other") == 4
+
+
 def test_what_cannot_be_unset(remote: Remote) -> None:
     parameter = types().message("rcl_interfaces/msg/Parameter").cls
     unset = parameter(name="count", value=remote.parameters._message("nothing"))
