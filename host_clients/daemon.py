@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from host_clients.closed_loop import ClosedLoop
+from host_clients.group import gather
 from host_clients.suite import exchange
-from reconros_zenoh.clock.virtual import succeed_once
 from reconros_zenoh.clock.wall import WallEnvironment, ending_event, keep_time
 from reconros_zenoh.errors import TransportError
 from reconros_zenoh.rmw.node import Context
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     import simpy
 
     from reconros_zenoh.measure.record import RoundTrip
-    from reconros_zenoh.transport.base import Transport
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,32 +78,3 @@ def begin_process() -> tuple[WallEnvironment, simpy.Event]:
     tune_memory()
     environment = WallEnvironment()
     return environment, ending_event(environment)
-
-
-def gather(
-    transport: Transport,
-    environment: WallEnvironment,
-    start: simpy.Event,
-    group: str | None,
-    name: str,
-    members: int,
-) -> None:
-    """Let `start` happen once so many members of the group, this one included, have announced themselves.
-
-    Without a group it happens at once.
-    """
-    if group is None:
-        start.succeed()
-        return
-    present: set[str] = set()
-
-    def on_change(key: str, alive: bool) -> None:
-        # One that has finished and gone was there all the same.
-        if alive:
-            present.add(key)
-        if len(present) >= members:
-            environment.post(succeed_once, start)
-
-    prefix = f"reconros/clients/{group}"
-    transport.watch_tokens(f"{prefix}/*", on_change)
-    transport.declare_token(f"{prefix}/{name}")

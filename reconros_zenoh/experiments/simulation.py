@@ -11,11 +11,12 @@ from typing import TYPE_CHECKING, Self
 from board_daemon.hosting import HostedBoard
 from host_clients.camera import Camera
 from host_clients.closed_loop import ClosedLoop
+from host_clients.group import gather
 from host_clients.robot import DrivingRobot
 from host_clients.scope import Scope
 from host_clients.suite import EXCHANGES, exchange
 from host_clients.viewer import Viewer
-from reconros_zenoh.clock.virtual import VirtualEnvironment, succeed_once
+from reconros_zenoh.clock.virtual import VirtualEnvironment
 from reconros_zenoh.errors import TransportError
 from reconros_zenoh.rmw.node import Context
 from reconros_zenoh.transport.memory import tune_memory
@@ -73,7 +74,6 @@ class Simulation:
         (to count what comes from a foreign one): each message would be refused by every other board.
         """
         self._network = SimulatedNetwork(self.environment)
-        self._groups: dict[str, _Group] = {}
 
     def add_board(
         self, profile: Profile, project: Project, mapping: Mapping, options: BoardOptions
@@ -101,11 +101,12 @@ class Simulation:
         )
         self._done.append(loop.done)
         self.environment.call_later(round(options.wait_s * 1e9), _check_answered, loop, options)
-        if options.group is None:
-            start.succeed()
-        else:
-            group = self._groups.setdefault(options.group, _Group())
-            group.join(options, loop, start)
+        assert loop.warm.callbacks is not None
+        loop.warm.callbacks.append(
+            lambda _: gather(
+                context.transport, self.environment, start, options.group, options.name, options.members
+            )
+        )
 
     def add_camera(self, options: CameraOptions) -> Camera:
         """Return a camera that begins at once; `router` and `group` say nothing here."""
@@ -147,27 +148,6 @@ class Simulation:
             self.environment.run(until=self.environment.all_of(self._done))
         else:
             self.environment.run(until=round(seconds * 1e9))
-
-
-class _Group:
-    """Clients that begin together: each once as many of them are warm as it was told."""
-
-    def __init__(self) -> None:
-        self._warm: set[str] = set()
-        self._waiting: list[tuple[int, simpy.Event]] = []
-
-    def join(self, options: ClientOptions, loop: ClosedLoop, start: simpy.Event) -> None:
-        """Let `start` happen when its time has come."""
-        self._waiting.append((options.members, start))
-
-        def arrive(_: simpy.Event) -> None:
-            self._warm.add(options.name)
-            for members, waiting in self._waiting:
-                if len(self._warm) >= members:
-                    succeed_once(waiting)
-
-        assert loop.warm.callbacks is not None
-        loop.warm.callbacks.append(arrive)
 
 
 def _check_answered(loop: ClosedLoop, options: ClientOptions) -> None:
