@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+from collections import defaultdict
 from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Any
 
@@ -81,10 +82,16 @@ def read_deployment(path: Path, environment: Mapping[str, str], *, has_end: bool
             )
         elif verb == "camera":
             cameras[name] = CameraOptions(
-                given["router"], given["pictures"], given["rate"], given["wait"], given["domain"]
+                given["router"],
+                given["pictures"],
+                given["rate"],
+                given["wait"],
+                given["domain"],
+                given["group"],
+                given["members"],
             )
         elif verb == "viewer":
-            viewers[name] = ViewerOptions(given["router"], domain=given["domain"])
+            viewers[name] = ViewerOptions(given["router"], domain=given["domain"], group=given["group"])
         elif verb == "robot":
             robots[name] = RobotOptions(
                 given["router"], given["pictures"], wait_s=given["wait"], domain=given["domain"]
@@ -163,12 +170,20 @@ def _check_clients(plan: DeploymentPlan, nodes: Mapping[str, Node]) -> None:
                 .mapping()["command"]
                 .error(f"asks in domain {domain}, where no board is.", "Give a board the same --domain.")
             )
-    for name, client in plan.clients.items():
-        command = nodes[name].mapping()["command"]
-        group = {other.name for other in plan.clients.values() if other.group == client.group}
-        if client.group is not None and len(group) < client.members:
+    groups: defaultdict[str | None, set[str]] = defaultdict(set)
+    for client in plan.clients.values():
+        groups[client.group].add(client.name)
+    for camera in plan.cameras.values():
+        groups[camera.group].add("camera")
+    for viewer in plan.viewers.values():
+        groups[viewer.group].add("viewer")
+    waiting: dict[str, ClientOptions | CameraOptions] = {**plan.clients, **plan.cameras}
+    for name, each in waiting.items():
+        there = len(groups[each.group])
+        if each.group is not None and there < each.members:
+            command = nodes[name].mapping()["command"]
             raise command.error(
-                f"waits for {client.members} clients of the group {client.group!r}, which has {len(group)}.",
+                f"waits for {each.members} clients of the group {each.group!r}, which has {there}.",
                 "Correct --members or add the clients.",
             )
 

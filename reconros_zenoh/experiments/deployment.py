@@ -140,7 +140,11 @@ class DeploymentRun:
                         for name in (service, f"{service}_control")
                     )
                     simulation.add_viewer(
-                        viewer.domain, pictures.append, indices.append, lambda _: on_round_trip()
+                        viewer.domain,
+                        pictures.append,
+                        indices.append,
+                        lambda _: on_round_trip(),
+                        viewer.group,
                     )
                     self._may_lose.add(service)
                 for camera in plan.cameras.values():

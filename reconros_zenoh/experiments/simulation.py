@@ -109,9 +109,11 @@ class Simulation:
         )
 
     def add_camera(self, options: CameraOptions) -> Camera:
-        """Return a camera that begins at once; `router` and `group` say nothing here."""
-        start = self.environment.event().succeed()
-        camera = Camera(self.environment, self.context(options.domain), self._types, options, start)
+        """Return a camera; `router` says nothing here."""
+        context = self.context(options.domain)
+        start = self.environment.event()
+        camera = Camera(self.environment, context, self._types, options, start)
+        gather(context.transport, self.environment, start, options.group, "camera", options.members)
         self._done.append(camera.done)
         return camera
 
@@ -128,11 +130,16 @@ class Simulation:
         on_picture_trip: Callable[[RoundTrip], None],
         on_control_trip: Callable[[RoundTrip], None],
         on_picture: Callable[[NDArray[np.uint8]], None] = lambda _: None,
+        group: str | None = None,
     ) -> None:
-        """Have the pictures and the control loop of the design example observed; see `Viewer` and `Scope`."""
+        """Have the pictures and the control loop of the design example observed; see `Viewer` and `Scope`.
+
+        It begins at once, and others of its `group` may wait for it.
+        """
         context = self.context(domain)
         Viewer(self.environment, context, self._types, on_picture_trip, on_picture)
         Scope(self.environment, context, self._types, on_control_trip)
+        gather(context.transport, self.environment, self.environment.event(), group, "viewer", 1)
 
     def context(self, domain: int = 0) -> Context:
         """Return a new session for nodes of one's own."""

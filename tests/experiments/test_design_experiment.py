@@ -296,6 +296,23 @@ def test_a_camera_that_nobody_looks_at_says_so() -> None:
     assert camera.sent == 0
 
 
+def test_a_camera_waits_for_the_others_of_its_group() -> None:
+    types = load_project(projects_folder() / "vision").types()
+    began_ns: list[int] = []
+    with Simulation(types) as simulation:
+        simulation.context().node("listener").subscription(
+            types.message("sensor_msgs/msg/Image"),
+            "/image_raw",
+            lambda _: began_ns.append(simulation.environment.now),
+        )
+        simulation.add_camera(CameraOptions("", 1, group="g", members=2))
+        simulation.environment.call_later(
+            1_000_000_000, lambda: simulation.add_viewer(0, [].append, [].append, group="g")
+        )
+        simulation.run()
+    assert began_ns == [1_000_000_000]
+
+
 def test_the_board_goes_on_after_pictures_that_it_cannot_filter() -> None:
     with Simulation(load_project(projects_folder() / "vision").types()) as simulation:
         example = Example(simulation, "one_slot")
