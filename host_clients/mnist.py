@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from host_clients.exchange import TopicExchange
-from host_clients.image import image_message
 from reconros_zenoh.applications.roundtrip.inputs import digits
 from reconros_zenoh.applications.roundtrip.kernels.mnist import shipped_classifier
+from reconros_zenoh.ros.image import image_message
 
 if TYPE_CHECKING:
     from numpy.random import Generator

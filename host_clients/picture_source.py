@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from host_clients.image import image_message
 from reconros_zenoh.clock.virtual import succeed_once
 from reconros_zenoh.errors import TransportError
+from reconros_zenoh.ros.image import image_message
+from reconros_zenoh.ros.stamp import set_stamp
 
 if TYPE_CHECKING:
     from collections.abc import Generator
@@ -18,8 +19,6 @@ if TYPE_CHECKING:
     from reconros_zenoh.clock.virtual import VirtualEnvironment
     from reconros_zenoh.rmw.node import Node
     from reconros_zenoh.ros.types import TypeRegistry
-
-_SECOND_NS = 1_000_000_000
 
 
 class PictureSource:
@@ -39,7 +38,7 @@ class PictureSource:
 
     def until_matched(self, wait_s: float) -> Generator[simpy.Event, object, None]:
         """Return once somebody subscribes; raise TransportError when nobody does within `wait_s`."""
-        yield self._matched | self._environment.timeout(round(wait_s * _SECOND_NS))
+        yield self._matched | self._environment.timeout(round(wait_s * 1e9))
         if not self._matched.triggered:
             raise TransportError(
                 f"nobody in domain {self._node.context.domain} subscribed to /image_raw within {wait_s:g} s. "
@@ -50,7 +49,7 @@ class PictureSource:
         """Publish a picture and return its time [ns]."""
         message = image_message(self._types, "bgr8", picture)
         now_ns = self._node.context.clock_ns()
-        message.header.stamp.sec, message.header.stamp.nanosec = divmod(now_ns, _SECOND_NS)
+        set_stamp(message.header.stamp, now_ns)
         message.header.frame_id = name
         self._publisher.publish(message)
         return now_ns

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 from xxhash import xxh3_128_digest
 
 from host_clients.exchange import TopicExchange
-from host_clients.image import image_message
 from reconros_zenoh.applications.roundtrip.inputs import images
 from reconros_zenoh.applications.roundtrip.kernels.sobel import sobel
+from reconros_zenoh.ros.image import image_message
 
 if TYPE_CHECKING:
     from numpy.random import Generator

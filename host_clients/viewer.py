@@ -12,6 +12,7 @@ from reconros_zenoh.applications.roundtrip.callbacks.checks import check_image
 from reconros_zenoh.applications.roundtrip.kernels.sobel import SHAPE, sobel
 from reconros_zenoh.errors import BadMessageError
 from reconros_zenoh.measure.record import RoundTrip
+from reconros_zenoh.ros.stamp import stamp_ns
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -23,7 +24,6 @@ if TYPE_CHECKING:
     from reconros_zenoh.rmw.received import Received
     from reconros_zenoh.ros.types import TypeRegistry
 
-_SECOND_NS = 1_000_000_000
 _MOST_DIGITS = 12
 _MOST_LEFT_OUT = 100_000  # hours of pictures; each is one line in the record
 
@@ -61,7 +61,7 @@ class Viewer:
             raise BadMessageError("frame_id", f"the frame_id is {text!r}, not a number")
         if int(text) - self._next > _MOST_LEFT_OUT:
             raise BadMessageError("frame_id", f"the frame_id is {text}, far behind {self._next}")
-        if _stamp_ns(message) > self._node.context.clock_ns():
+        if stamp_ns(message.header.stamp) > self._node.context.clock_ns():
             raise BadMessageError("stamp", "the picture was taken later than now: the clocks differ")
 
     def _arrive(self, received: Received) -> None:
@@ -75,14 +75,9 @@ class Viewer:
         self._next = number + 1
         picture = message.data.reshape(SHAPE)
         right = np.array_equal(picture, _expected(number % FRAMES))
-        time_ns = arrived_ns - _stamp_ns(message)
+        time_ns = arrived_ns - stamp_ns(message.header.stamp)
         self._on_trip(RoundTrip(number, time_ns, "ok" if right else "wrong"))
         self._on_picture(picture)
-
-
-def _stamp_ns(message: Any) -> int:
-    stamp = message.header.stamp
-    return int(stamp.sec * _SECOND_NS + stamp.nanosec)
 
 
 @cache

@@ -14,6 +14,8 @@ from functools import partial
 from importlib.resources import as_file, files
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from board_daemon.hosting import BoardOptions, HostedBoard
 from reconros_zenoh.applications.gateway.nodes import random_body
 from reconros_zenoh.board.executor import Executor
@@ -25,6 +27,8 @@ from reconros_zenoh.experiments.gateway import setup_mapping
 from reconros_zenoh.project.loader import load_project
 from reconros_zenoh.project.mapping_file import CallbackMapping
 from reconros_zenoh.rmw.node import Context
+from reconros_zenoh.ros.image import image_message
+from reconros_zenoh.ros.stamp import set_stamp, stamp_ns
 from reconros_zenoh.ros.types import TypeRegistry
 from reconros_zenoh.transport.memory import tune_memory
 from reconros_zenoh.transport.zenoh import ZenohTransport
@@ -41,7 +45,6 @@ if TYPE_CHECKING:
 
 _TOPIC = "/a"
 _TYPE = "sensor_msgs/msg/Image"
-_S = 1_000_000_000
 
 Receipt = tuple[str, int, int]
 """A subscriber's name, the number of the message, and the transmission time [ns]."""
@@ -76,8 +79,7 @@ class Receiver:
 
 
 def _receipt(name: str, image: Any, now_ns: int) -> Receipt:
-    sent_ns = image.header.stamp.sec * _S + image.header.stamp.nanosec
-    return name, int(image.header.frame_id.split()[0]), now_ns - sent_ns
+    return name, int(image.header.frame_id.split()[0]), now_ns - stamp_ns(image.header.stamp)
 
 
 def run_board(connection: Connection, router: str, variant: Variant, count: int) -> None:
@@ -161,21 +163,12 @@ def run_publisher(connection: Connection, router: str, size: int) -> None:
     types = TypeRegistry()
     body = random_body(size)
     crc = zlib.crc32(body.data)
-    image_type, header = types.message(_TYPE), types.message("std_msgs/msg/Header").cls
-    stamp = types.message("builtin_interfaces/msg/Time").cls
+    image = image_message(types, "mono8", body[np.newaxis])
     with ZenohTransport.open(router) as transport:
-        publisher = Context(transport).node("publisher").publisher(image_type, _TOPIC)
+        publisher = Context(transport).node("publisher").publisher(types.message(_TYPE), _TOPIC)
         for number in commands(connection):
-            image = image_type.cls(
-                header=header(stamp=stamp(sec=0, nanosec=0), frame_id=f"{number} {crc:08x}"),
-                height=1,
-                width=size,
-                encoding="mono8",
-                is_bigendian=0,
-                step=size,
-                data=body,
-            )
-            image.header.stamp.sec, image.header.stamp.nanosec = divmod(time.monotonic_ns(), _S)
+            image.header.frame_id = f"{number} {crc:08x}"
+            set_stamp(image.header.stamp, time.monotonic_ns())
             publisher.publish(image)
 
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from reconros_zenoh.errors import BadMessageError
 from reconros_zenoh.ros.qos import Durability, QosProfile
+from reconros_zenoh.ros.stamp import set_stamp, stamp_ns
 from reconros_zenoh.ros.zero_message import zero_message
 
 if TYPE_CHECKING:
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
 STATUS_QOS = QosProfile(durability=Durability.TRANSIENT_LOCAL, depth=1)
 """rcl_action_qos_profile_status_default."""
 
-_SECOND_NS = 1_000_000_000
 _ENDED_KEPT = 100
 _MOST_WAITING = 100
 _NONE, _REJECTED, _UNKNOWN_GOAL, _TERMINATED = range(4)  # return codes of action_msgs/srv/CancelGoal
@@ -158,7 +158,7 @@ class ActionServer:
         goal_id = bytes(request.goal_id.uuid)
         response = zero_message(self._type.send_goal.response)
         now_ns = self._context.clock_ns()
-        response.stamp.sec, response.stamp.nanosec = divmod(now_ns, _SECOND_NS)
+        set_stamp(response.stamp, now_ns)
         handle = GoalHandle(self, goal_id, request.goal, now_ns)
         with self._lock:
             response.accepted = goal_id not in self._goals and self._is_accepted(
@@ -184,10 +184,10 @@ class ActionServer:
         info, responder = received.message.goal_info, received.responder
         assert responder is not None
         goal_id = bytes(info.goal_id.uuid)
-        stamp_ns = info.stamp.sec * _SECOND_NS + info.stamp.nanosec
+        until_ns = stamp_ns(info.stamp)
         response = zero_message(self._type.cancel_goal.response)
         with self._lock:
-            meant = [handle for handle in self._goals.values() if _is_meant(handle, goal_id, stamp_ns)]
+            meant = [handle for handle in self._goals.values() if _is_meant(handle, goal_id, until_ns)]
             going = [handle for handle in meant if handle.status.cancelable]
             for handle in going:
                 handle.status = GoalStatus.CANCELING
@@ -195,7 +195,7 @@ class ActionServer:
                 _goal_info(self._type.cancel_goal.response, handle) for handle in going
             ]
             if not going:
-                one = any(goal_id) and not stamp_ns
+                one = any(goal_id) and not until_ns
                 response.return_code = (_TERMINATED if meant else _UNKNOWN_GOAL) if one else _NONE
             else:
                 self._publish_status()
@@ -236,15 +236,15 @@ class ActionServer:
             del self._goals[goal_id], self._entries[goal_id], self._results[goal_id]
 
 
-def _is_meant(handle: GoalHandle, goal_id: bytes, stamp_ns: int) -> bool:
+def _is_meant(handle: GoalHandle, goal_id: bytes, until_ns: int) -> bool:
     """Tell whether a request to cancel means the goal: by its id, by its time, or because all are meant."""
     if not any(goal_id):
-        return not stamp_ns or handle.stamp_ns <= stamp_ns
-    return handle.goal_id == goal_id or (stamp_ns > 0 and handle.stamp_ns <= stamp_ns)
+        return not until_ns or handle.stamp_ns <= until_ns
+    return handle.goal_id == goal_id or (until_ns > 0 and handle.stamp_ns <= until_ns)
 
 
 def _goal_info(owner: MessageType, handle: GoalHandle) -> Any:
     info = zero_message(owner.nested("action_msgs/msg/GoalInfo"))
     info.goal_id.uuid[:] = list(handle.goal_id)
-    info.stamp.sec, info.stamp.nanosec = divmod(handle.stamp_ns, _SECOND_NS)
+    set_stamp(info.stamp, handle.stamp_ns)
     return info

@@ -11,6 +11,7 @@ import numpy as np
 
 from reconros_zenoh.errors import UsageError
 from reconros_zenoh.ros.qos import QosProfile
+from reconros_zenoh.ros.stamp import set_stamp
 from reconros_zenoh.ros.zero_message import zero_message
 
 if TYPE_CHECKING:
@@ -202,7 +203,7 @@ class Parameters:
     def _event(self, declared: Iterable[str], changed: Iterable[str]) -> Any:
         """Return what is published about these parameters as they are now."""
         event = zero_message(self._event_type)
-        event.stamp.sec, event.stamp.nanosec = divmod(self._node.context.clock_ns(), 1_000_000_000)
+        set_stamp(event.stamp, self._node.context.clock_ns())
         event.node = self._node.fully_qualified_name
         parameter = self._parameter_type.cls
         event.new_parameters = [parameter(name=name, value=self._message(name)) for name in declared]

@@ -26,9 +26,9 @@ import numpy as np
 import zenoh
 from table import arguments, free_port, print_result
 
-from host_clients.image import image_message
 from reconros_zenoh.clock.wall import keep_time
 from reconros_zenoh.rmw.node import Context
+from reconros_zenoh.ros.image import image_message
 from reconros_zenoh.ros.types import TypeRegistry
 from reconros_zenoh.transport.memory import tune_memory
 from reconros_zenoh.transport.zenoh import ZenohRouter, ZenohTransport

@@ -15,7 +15,6 @@ import pytest
 from typer.testing import CliRunner
 
 from board_daemon.hosting import BoardOptions
-from host_clients.image import image_message
 from host_clients.robot import RobotOptions, Step, stood_s
 from reconros_zenoh.applications.driving.nodes import check_picture
 from reconros_zenoh.applications.driving.world import RED_S, Robot, World
@@ -39,6 +38,7 @@ from reconros_zenoh.mapping.communication import Crossings, map_topics
 from reconros_zenoh.mapping.project_graph import read_project_graph
 from reconros_zenoh.measure.driving_plots import driving_figure
 from reconros_zenoh.project.loader import load_project, read_project
+from reconros_zenoh.ros.image import image_message
 from reconros_zenoh.ros.types import TypeRegistry
 
 if TYPE_CHECKING:

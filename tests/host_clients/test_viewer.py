@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from host_clients.image import image_message
 from host_clients.viewer import Viewer
 from reconros_zenoh.applications.roundtrip.kernels.sobel import SHAPE
 from reconros_zenoh.clock.virtual import VirtualEnvironment
 from reconros_zenoh.measure.record import RoundTrip
 from reconros_zenoh.rmw.node import Context
+from reconros_zenoh.ros.image import image_message
 from reconros_zenoh.ros.types import TypeRegistry
 from reconros_zenoh.transport.simulated import SimulatedNetwork
 

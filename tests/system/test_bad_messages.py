@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 from processes import LIMIT_S
 
-from host_clients.image import image_message
 from host_clients.suite import EXCHANGES, exchange
 from reconros_zenoh.board.control import ask_status
 from reconros_zenoh.rmw.node import Context
 from reconros_zenoh.ros.attachment import Attachment
+from reconros_zenoh.ros.image import image_message
 from reconros_zenoh.ros.names import data_key
 from reconros_zenoh.ros.qos import QosProfile
 

@@ -14,6 +14,7 @@ from reconros_zenoh.applications.driving.kernels import find_key_points, fit_lan
 from reconros_zenoh.applications.driving.view import HEIGHT, WIDTH
 from reconros_zenoh.applications.roundtrip.callbacks.checks import check_image
 from reconros_zenoh.errors import BadMessageError
+from reconros_zenoh.ros.image import image_fields
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator
@@ -70,13 +71,7 @@ class Filter:
         result = yield from thread.compute(self._kernel, picture)
         yield from thread.mem_write(result, to=self._publisher)
         image = self._publisher.message(
-            header=message.header,
-            height=HEIGHT,
-            width=WIDTH,
-            encoding="mono8" if result.ndim == 2 else "bgr8",
-            is_bigendian=0,
-            step=result[0].size,
-            data=result.reshape(-1),
+            header=message.header, **image_fields("mono8" if result.ndim == 2 else "bgr8", result)
         )
         yield from thread.publish(self._publisher, image)
 

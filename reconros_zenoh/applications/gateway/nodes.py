@@ -15,6 +15,8 @@ import numpy as np
 
 from reconros_zenoh.board.executor import Executor
 from reconros_zenoh.executor.callbacks import CallbackKind
+from reconros_zenoh.ros.image import image_fields
+from reconros_zenoh.ros.stamp import set_stamp, stamp_ns
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator
@@ -34,7 +36,6 @@ if TYPE_CHECKING:
     """Gets a subscriber's name, the number of an image that it has copied, and the transmission time [ns]."""
 
 SUBSCRIBERS = 8
-_S = 1_000_000_000
 
 
 class Publisher:
@@ -68,19 +69,11 @@ class Publisher:
 
     def _image(self, now_ns: int) -> Any:
         self._number += 1
-        seconds, nanoseconds = divmod(now_ns, _S)
-        return self._writer.message(
-            header=self._header(
-                stamp=self._time(sec=seconds, nanosec=nanoseconds),
-                frame_id=f"{self._name} {self._number} {self._crc:08x}",
-            ),
-            height=1,
-            width=len(self._body),
-            encoding="mono8",
-            is_bigendian=0,
-            step=len(self._body),
-            data=self._body,
+        header = self._header(
+            stamp=self._time(sec=0, nanosec=0), frame_id=f"{self._name} {self._number} {self._crc:08x}"
         )
+        set_stamp(header.stamp, now_ns)
+        return self._writer.message(header=header, **image_fields("mono8", self._body[np.newaxis]))
 
 
 class Subscriber:
@@ -109,8 +102,7 @@ class Subscriber:
         self._expected[publisher] = number + 1
         if number != expected or crc != int(wanted_crc, 16):
             raise ValueError(f"got image {number} with CRC {crc:08x}, not {expected} with {wanted_crc}")
-        sent_ns = image.header.stamp.sec * _S + image.header.stamp.nanosec
-        self._on_received(number, now_ns - sent_ns)
+        self._on_received(number, now_ns - stamp_ns(image.header.stamp))
 
 
 def random_body(size: int) -> NDArray[np.uint8]:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from reconros_zenoh.applications.roundtrip.callbacks.checks import check_image
 from reconros_zenoh.applications.roundtrip.kernels.sobel import SHAPE, sobel
+from reconros_zenoh.ros.image import image_fields
 
 if TYPE_CHECKING:
     from collections.abc import Generator
@@ -45,12 +46,4 @@ class Sobel:
         yield from thread.publish(self._publisher, self._answer(message, edges))
 
     def _answer(self, message: Any, edges: NDArray[np.uint8]) -> Any:
-        return self._publisher.message(
-            header=message.header,
-            height=HEIGHT,
-            width=WIDTH,
-            encoding="bgr8",
-            is_bigendian=0,
-            step=WIDTH * CHANNELS,
-            data=edges.reshape(-1),
-        )
+        return self._publisher.message(header=message.header, **image_fields("bgr8", edges))
