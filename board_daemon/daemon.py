@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING, Any
 from board_daemon.hosting import HostedBoard
 from reconros_zenoh.board.control import ControlServer, claim_name, status
 from reconros_zenoh.board.gateway_control import GatewayServer
+from reconros_zenoh.clock.process import begin_process
 from reconros_zenoh.clock.virtual import succeed_once
-from reconros_zenoh.clock.wall import WallEnvironment, ending_event, keep_time
-from reconros_zenoh.transport.memory import tune_memory
 from reconros_zenoh.transport.zenoh import ZenohTransport
 
 if TYPE_CHECKING:
@@ -35,10 +34,7 @@ def run_board(
     `on_ready` is called once the board serves. Raise TransportError without a router, UsageError when the
     name is taken.
     """
-    keep_time()
-    tune_memory()
-    environment = WallEnvironment()
-    stop = ending_event(environment)
+    environment, stop = begin_process()
     with ZenohTransport.open(router) as transport:
         claim_name(transport, options.name)
         hosted = HostedBoard(environment, transport, profile, project, mapping, options)

@@ -8,17 +8,14 @@ from typing import TYPE_CHECKING
 from host_clients.closed_loop import ClosedLoop
 from host_clients.group import gather
 from host_clients.suite import exchange
-from reconros_zenoh.clock.wall import WallEnvironment, ending_event, keep_time
+from reconros_zenoh.clock.process import begin_process
 from reconros_zenoh.errors import TransportError
 from reconros_zenoh.rmw.node import Context
 from reconros_zenoh.ros.types import TypeRegistry
-from reconros_zenoh.transport.memory import tune_memory
 from reconros_zenoh.transport.zenoh import ZenohTransport
 
 if TYPE_CHECKING:
     from collections.abc import Callable
-
-    import simpy
 
     from reconros_zenoh.measure.record import RoundTrip
 
@@ -70,11 +67,3 @@ def run_client(options: ClientOptions, on_round_trip: Callable[[RoundTrip], None
         gather(transport, environment, start, options.group, options.name, options.members)
         environment.run(until=loop.done | stop)
         return loop.done.triggered
-
-
-def begin_process() -> tuple[WallEnvironment, simpy.Event]:
-    """Return the event loop of this process, and the event that SIGINT and SIGTERM make happen."""
-    keep_time()
-    tune_memory()
-    environment = WallEnvironment()
-    return environment, ending_event(environment)

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING
 import cv2
 
 from host_clients.camera import Camera
-from host_clients.daemon import begin_process
 from host_clients.gallery import Gallery
 from host_clients.group import gather
 from host_clients.picture_server import PictureServer
 from host_clients.robot import DrivingRobot
 from host_clients.scope import Scope
 from host_clients.viewer import Viewer
+from reconros_zenoh.clock.process import begin_process
 from reconros_zenoh.measure.record import RecordWriter
 from reconros_zenoh.rmw.node import Context
 from reconros_zenoh.ros.types import TypeRegistry

@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes
-import os
-import signal
-import sys
 import threading
 import time
 from collections import deque
@@ -15,7 +11,7 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from reconros_zenoh.clock.alarm import Alarm
-from reconros_zenoh.clock.virtual import VirtualEnvironment, succeed_once
+from reconros_zenoh.clock.virtual import VirtualEnvironment
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -31,7 +27,6 @@ _LATE_SLEEPS = 0.05
 _TURN_NS = 1_000_000
 # A signal that comes just as the sleep begins is served when it ends.
 _NAP_NS = 1_000_000_000
-_PR_SET_TIMERSLACK = 29
 _LAGS_KEPT = 1 << 16
 
 
@@ -173,26 +168,3 @@ class WallEnvironment(VirtualEnvironment):
         """Adjust how long before an event a sleep is to end."""
         step_ns = _LEAD_STEP_NS * (is_late - _LATE_SLEEPS)
         self._lead_ns = min(max(self._lead_ns + step_ns, _LEAST_LEAD_NS), _MOST_LEAD_NS)
-
-
-def keep_time() -> None:
-    """Make this process punctual; called once by a daemon before it starts any thread.
-
-    Linux delays timers by up to 50 us to save wake-ups, and CPython hands the interpreter over every 5 ms
-    only. OpenCV would keep other cores spinning for what is done sooner on one: a digit in 0.46 ms, not 0.49.
-    """
-    os.environ.setdefault("OPENCV_FOR_THREADS_NUM", "1")  # read when it first computes
-    sys.setswitchinterval(0.00005)
-    if sys.platform == "linux":
-        ctypes.CDLL(None).prctl(_PR_SET_TIMERSLACK, 1, 0, 0, 0)
-
-
-def ending_event(environment: WallEnvironment) -> simpy.Event:
-    """Return an event that SIGINT and SIGTERM make happen from now on, instead of anything else.
-
-    For processes that run until they are told to end; called by the main thread.
-    """
-    ending = environment.event()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: environment.post(succeed_once, ending))
-    return ending

@@ -20,8 +20,9 @@ from board_daemon.hosting import BoardOptions, HostedBoard
 from reconros_zenoh.applications.gateway.nodes import random_body
 from reconros_zenoh.board.executor import Executor
 from reconros_zenoh.board.profile import read_profile
+from reconros_zenoh.clock.process import tune_process
 from reconros_zenoh.clock.virtual import succeed_once
-from reconros_zenoh.clock.wall import WallEnvironment, keep_time
+from reconros_zenoh.clock.wall import WallEnvironment
 from reconros_zenoh.executor.callbacks import CallbackKind
 from reconros_zenoh.experiments.gateway import setup_mapping
 from reconros_zenoh.project.loader import load_project
@@ -30,7 +31,6 @@ from reconros_zenoh.rmw.node import Context
 from reconros_zenoh.ros.image import image_message
 from reconros_zenoh.ros.stamp import set_stamp, stamp_ns
 from reconros_zenoh.ros.types import TypeRegistry
-from reconros_zenoh.transport.memory import tune_memory
 from reconros_zenoh.transport.zenoh import ZenohTransport
 
 if TYPE_CHECKING:
@@ -175,8 +175,7 @@ def run_publisher(connection: Connection, router: str, size: int) -> None:
 def begin_process() -> None:
     """Make this process punctual, and leave Ctrl-C to the one that started it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C ends the experiment, and that its processes
-    keep_time()
-    tune_memory()
+    tune_process()
 
 
 def commands(connection: Connection) -> Iterator[Any]:

@@ -16,10 +16,10 @@ from host_clients.robot import DrivingRobot
 from host_clients.scope import Scope
 from host_clients.suite import EXCHANGES, exchange
 from host_clients.viewer import Viewer
+from reconros_zenoh.clock.process import tune_memory
 from reconros_zenoh.clock.virtual import VirtualEnvironment
 from reconros_zenoh.errors import TransportError
 from reconros_zenoh.rmw.node import Context
-from reconros_zenoh.transport.memory import tune_memory
 from reconros_zenoh.transport.simulated import SimulatedNetwork
 
 if TYPE_CHECKING:

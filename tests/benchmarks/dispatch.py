@@ -21,8 +21,9 @@ from reconros_zenoh.board.endpoints import Event, Source
 from reconros_zenoh.board.executor import Executor
 from reconros_zenoh.board.profile import read_profile
 from reconros_zenoh.board.spans import Timeline
+from reconros_zenoh.clock.process import tune_process
 from reconros_zenoh.clock.virtual import succeed_once
-from reconros_zenoh.clock.wall import WallEnvironment, keep_time
+from reconros_zenoh.clock.wall import WallEnvironment
 from reconros_zenoh.executor.callbacks import CallbackKind
 from reconros_zenoh.rmw.node import Context
 from reconros_zenoh.transport.simulated import SimulatedNetwork
@@ -143,7 +144,7 @@ def main() -> None:
     parser = arguments(__doc__ or "")
     parser.add_argument("--count", type=int, default=3000, help="callbacks per row")
     given = parser.parse_args()
-    keep_time()
+    tune_process()
     rows: list[dict[str, Any]] = []
     for callbacks in COUNTS:
         times_us = ready_to_start_us(callbacks, given.count)

@@ -26,11 +26,10 @@ import numpy as np
 import zenoh
 from table import arguments, free_port, print_result
 
-from reconros_zenoh.clock.wall import keep_time
+from reconros_zenoh.clock.process import tune_memory, tune_process
 from reconros_zenoh.rmw.node import Context
 from reconros_zenoh.ros.image import image_message
 from reconros_zenoh.ros.types import TypeRegistry
-from reconros_zenoh.transport.memory import tune_memory
 from reconros_zenoh.transport.zenoh import ZenohRouter, ZenohTransport
 
 if TYPE_CHECKING:
@@ -67,8 +66,7 @@ def raw_echo(router: str) -> None:
 
 def raw_client(router: str) -> None:
     """For each line `bytes count` on stdin print the median round trip [us]: the rival's client process."""
-    keep_time()
-    tune_memory()
+    tune_process()
     answers: SimpleQueue[int] = SimpleQueue()
 
     def on_sample(sample: zenoh.Sample) -> None:
@@ -126,8 +124,7 @@ def main() -> None:
 
 def run() -> list[dict[str, Any]]:
     """Start the processes of both sides and return a row per message."""
-    keep_time()
-    tune_memory()
+    tune_process()
     router = f"tcp/127.0.0.1:{free_port()}"
     board = ["-m", "board_daemon", str(ECHO), "--profile=native", "--mapping=software", "--name=echo"]
     with ExitStack() as stack:

@@ -292,7 +292,7 @@ def test_a_signal_handler_may_post_to_a_loop_that_sleeps_in_the_main_thread(
 
 
 def test_a_punctual_process_leaves_one_core_to_a_computation() -> None:
-    lines = ("from reconros_zenoh.clock.wall import keep_time", "keep_time()", "import cv2")
+    lines = ("from reconros_zenoh.clock.process import tune_process", "tune_process()", "import cv2")
     program = "; ".join((*lines, "print(cv2.getNumThreads())"))
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert done.stdout == "1\n"

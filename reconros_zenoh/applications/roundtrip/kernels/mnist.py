@@ -34,7 +34,7 @@ class Classifier:
     another network does, and OpenCV releases the GIL meanwhile.
 
     OpenCV may split a call over its own threads. One does better for so small a network, but their number can
-    only be set for the whole process, which is for the process to decide: daemons do (`keep_time`).
+    only be set for the whole process, which is for the process to decide: daemons do (`tune_process`).
     """
 
     def __init__(self, model: Path = MODEL) -> None:

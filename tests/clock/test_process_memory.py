@@ -5,7 +5,7 @@ import subprocess
 import sys
 from typing import TYPE_CHECKING
 
-from reconros_zenoh.transport.memory import tune_memory
+from reconros_zenoh.clock.process import tune_memory
 
 if TYPE_CHECKING:
     import pytest
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 # Counts the buffers that malloc has taken from the kernel one by one (`hblks` of mallinfo2).
 COUNT_MAPPED = """
 import ctypes
-from reconros_zenoh.transport.memory import tune_memory
+from reconros_zenoh.clock.process import tune_memory
 
 class MallInfo(ctypes.Structure):
     _fields_ = [(name, ctypes.c_size_t) for name in
