@@ -13,9 +13,9 @@ from reconros_zenoh.board.actions import ActionClientSource, ActionSource
 from reconros_zenoh.board.board import Board, SlotPlan
 from reconros_zenoh.board.clients import ClientSource
 from reconros_zenoh.board.control import status
-from reconros_zenoh.board.endpoints import ServiceSource, SubscriptionSource, TimerSource
 from reconros_zenoh.board.executor import Executor
 from reconros_zenoh.board.profile import Profile, read_profile
+from reconros_zenoh.board.sources import ServiceSource, SubscriptionSource, TimerSource
 from reconros_zenoh.clock.virtual import VirtualEnvironment, succeed_once
 from reconros_zenoh.errors import UsageError
 from reconros_zenoh.project.loader import load_project
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from reconros_zenoh.board.endpoints import TopicWriter
+    from reconros_zenoh.board.writers import TopicWriter
     from reconros_zenoh.ros.qos import QosProfile
 
 _SECOND_NS = 1_000_000_000

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, cast
 
-from reconros_zenoh.board.endpoints import Event, Source
+from reconros_zenoh.board.sources import Event, Source
 from reconros_zenoh.board.spans import Timeline
 from reconros_zenoh.board.stack_node import StackNode
 from reconros_zenoh.errors import BadMessageError, UsageError

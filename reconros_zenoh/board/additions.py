@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from reconros_zenoh.board.endpoints import Source
 from reconros_zenoh.board.kernel import Kernel
+from reconros_zenoh.board.sources import Source
 from reconros_zenoh.board.timing import Cycles, Native
 from reconros_zenoh.errors import UsageError
 from reconros_zenoh.executor.callbacks import CallbackKind

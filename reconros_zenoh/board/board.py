@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 from reconros_zenoh.board.address_space import AddressSpace
 from reconros_zenoh.board.cpu import Cpu
 from reconros_zenoh.board.dds import DdsStack
-from reconros_zenoh.board.endpoints import TopicWriter
 from reconros_zenoh.board.gateway import Gateway
 from reconros_zenoh.board.hmt import HardwareTopic, hmt_key
 from reconros_zenoh.board.host import Host
@@ -18,6 +17,7 @@ from reconros_zenoh.board.memif import Memif
 from reconros_zenoh.board.osif import Osif
 from reconros_zenoh.board.slots import Slot
 from reconros_zenoh.board.spans import Spans
+from reconros_zenoh.board.writers import TopicWriter
 from reconros_zenoh.board.zycap import ZyCAP
 from reconros_zenoh.errors import UsageError
 from reconros_zenoh.gateway.filters import Pair, conflict

@@ -27,10 +27,11 @@ if TYPE_CHECKING:
     from reconros_zenoh.board.bitstream import Bitstream
     from reconros_zenoh.board.board import Board
     from reconros_zenoh.board.clients import ClientSource
-    from reconros_zenoh.board.endpoints import Event, MessageWriter
     from reconros_zenoh.board.host import Limit
     from reconros_zenoh.board.slots import Slot
+    from reconros_zenoh.board.sources import Event
     from reconros_zenoh.board.timing import ExecutionTime
+    from reconros_zenoh.board.writers import MessageWriter
     from reconros_zenoh.clock.activity import Awaitable
     from reconros_zenoh.rmw.action_server import GoalHandle
     from reconros_zenoh.ros.types import MessageType

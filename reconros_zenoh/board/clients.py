@@ -6,8 +6,9 @@ import logging
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from reconros_zenoh.board.endpoints import Event, Reader, Writer
+from reconros_zenoh.board.sources import Event, Reader
 from reconros_zenoh.board.spans import Timeline
+from reconros_zenoh.board.writers import Writer
 from reconros_zenoh.errors import BadMessageError, TransportError
 from reconros_zenoh.executor.callbacks import CallbackKind
 from reconros_zenoh.rmw.received import Received

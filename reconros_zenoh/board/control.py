@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     from pydantic import BaseModel
 
     from reconros_zenoh.board.board import Board
-    from reconros_zenoh.board.endpoints import TopicWriter
     from reconros_zenoh.board.executor import Executor
+    from reconros_zenoh.board.writers import TopicWriter
     from reconros_zenoh.transport.base import Declaration, Reply, Request, Transport
 
 _log = logging.getLogger(__name__)

@@ -31,8 +31,8 @@ if TYPE_CHECKING:
 
     from reconros_zenoh.board.board import Board
     from reconros_zenoh.board.callback import HardwareCallback
-    from reconros_zenoh.board.endpoints import Event, Source
     from reconros_zenoh.board.software import SoftwareCallback
+    from reconros_zenoh.board.sources import Event, Source
     from reconros_zenoh.board.timing import ExecutionTime, Timing
     from reconros_zenoh.board.workers import Worker
     from reconros_zenoh.executor.callbacks import Dispatch

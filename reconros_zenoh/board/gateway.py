@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from reconros_zenoh.board.endpoints import SubscriptionSource
 from reconros_zenoh.board.hmt import Fifo, FifoPlan
+from reconros_zenoh.board.sources import SubscriptionSource
 from reconros_zenoh.clock.activity import Activity, Signal
 from reconros_zenoh.errors import BadMessageError
 from reconros_zenoh.gateway import core
@@ -16,9 +16,9 @@ if TYPE_CHECKING:
 
     from reconros_zenoh.board.bitstream import Bitstream
     from reconros_zenoh.board.board import Board
-    from reconros_zenoh.board.endpoints import Event
     from reconros_zenoh.board.hmt import HardwareTopic
     from reconros_zenoh.board.slots import Slot
+    from reconros_zenoh.board.sources import Event
     from reconros_zenoh.clock.activity import Awaitable
     from reconros_zenoh.rmw.node import Node
     from reconros_zenoh.ros.qos import QosProfile

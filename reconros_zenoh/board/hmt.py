@@ -10,7 +10,7 @@ from collections import deque
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
-from reconros_zenoh.board.endpoints import Event, Source
+from reconros_zenoh.board.sources import Event, Source
 from reconros_zenoh.board.stream import Stream
 from reconros_zenoh.clock.activity import Signal
 from reconros_zenoh.errors import BadMessageError, UsageError

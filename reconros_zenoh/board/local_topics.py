@@ -12,9 +12,9 @@ from collections import defaultdict, deque
 from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from reconros_zenoh.board.endpoints import TopicWriter
 from reconros_zenoh.board.spans import Timeline
 from reconros_zenoh.board.stream import Stream
+from reconros_zenoh.board.writers import TopicWriter
 from reconros_zenoh.rmw.received import Received
 from reconros_zenoh.ros.graph import EndpointKind, EndpointToken, parse, tokens_expression
 from reconros_zenoh.ros.message_arrays import snapshot
@@ -25,9 +25,9 @@ if TYPE_CHECKING:
     from collections.abc import Generator
 
     from reconros_zenoh.board.board import Board
-    from reconros_zenoh.board.endpoints import SubscriptionSource
     from reconros_zenoh.board.osif import Osif
     from reconros_zenoh.board.profile import Model, TopicsSection
+    from reconros_zenoh.board.sources import SubscriptionSource
     from reconros_zenoh.clock.activity import Awaitable
     from reconros_zenoh.rmw.node import Node
     from reconros_zenoh.ros.types import MessageType

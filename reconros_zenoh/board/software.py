@@ -16,11 +16,11 @@ if TYPE_CHECKING:
     from reconros_zenoh.board.actions import ActionClientSource
     from reconros_zenoh.board.board import Board
     from reconros_zenoh.board.clients import ClientSource
-    from reconros_zenoh.board.endpoints import MessageWriter
     from reconros_zenoh.board.host import Limit
     from reconros_zenoh.board.os_resources import Condition, Mailbox, Mutex, Semaphore
     from reconros_zenoh.board.spans import Timeline
     from reconros_zenoh.board.timing import ExecutionTime
+    from reconros_zenoh.board.writers import MessageWriter
 
 R = TypeVar("R")
 

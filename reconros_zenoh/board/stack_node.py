@@ -7,9 +7,9 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from reconros_zenoh.board.clients import UNSENT
-from reconros_zenoh.board.endpoints import Writer
 from reconros_zenoh.board.spans import Timeline
 from reconros_zenoh.board.stream import Stream
+from reconros_zenoh.board.writers import Writer
 from reconros_zenoh.errors import TransportError
 from reconros_zenoh.rmw.received import Received
 from reconros_zenoh.ros.names import resolve

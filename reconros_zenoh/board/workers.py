@@ -18,11 +18,11 @@ if TYPE_CHECKING:
     from collections.abc import Generator
 
     from reconros_zenoh.board.callback import HardwareCallback, HardwareImplementation
-    from reconros_zenoh.board.endpoints import Event
     from reconros_zenoh.board.executor import Executor
     from reconros_zenoh.board.host import Limit
     from reconros_zenoh.board.slots import Slot
     from reconros_zenoh.board.software import SoftwareImplementation
+    from reconros_zenoh.board.sources import Event
     from reconros_zenoh.board.spans import Timeline
     from reconros_zenoh.clock.activity import Awaitable
     from reconros_zenoh.executor.callbacks import Dispatch

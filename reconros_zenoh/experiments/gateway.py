@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from board_daemon.hosting import BoardOptions, HostedBoard
 from reconros_zenoh.applications.gateway.nodes import SUBSCRIBERS, random_body, run_nodes
-from reconros_zenoh.board.endpoints import Event, Source
+from reconros_zenoh.board.sources import Event, Source
 from reconros_zenoh.board.spans import Timeline
 from reconros_zenoh.clock.virtual import VirtualEnvironment, succeed_once
 from reconros_zenoh.clock.wall import WallEnvironment

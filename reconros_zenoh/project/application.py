@@ -8,10 +8,10 @@ import numpy as np
 
 from reconros_zenoh.board.actions import ActionClientSource, ActionSource
 from reconros_zenoh.board.clients import ClientSource
-from reconros_zenoh.board.endpoints import ServiceSource, SubscriptionSource, TimerSource
 from reconros_zenoh.board.executor import Executor
 from reconros_zenoh.board.hmt import HmtSource, HmtWriter
 from reconros_zenoh.board.os_resources import Condition, Mailbox, Mutex, Semaphore, SharedMemory
+from reconros_zenoh.board.sources import ServiceSource, SubscriptionSource, TimerSource
 from reconros_zenoh.board.stack_node import StackNode
 from reconros_zenoh.errors import FileError, UsageError
 from reconros_zenoh.project.build_cfg import RosGateway
@@ -24,10 +24,11 @@ if TYPE_CHECKING:
 
     from reconros_zenoh.board.board import Board
     from reconros_zenoh.board.callback import HardwareCallback
-    from reconros_zenoh.board.endpoints import MessageWriter, Source
     from reconros_zenoh.board.hmt import HardwareTopic
     from reconros_zenoh.board.software import SoftwareCallback
+    from reconros_zenoh.board.sources import Source
     from reconros_zenoh.board.timing import Timing
+    from reconros_zenoh.board.writers import MessageWriter
     from reconros_zenoh.project.loader import Project
     from reconros_zenoh.project.mapping_file import Mapping
     from reconros_zenoh.project.resource_groups import Resource

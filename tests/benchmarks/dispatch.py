@@ -17,9 +17,9 @@ from typing import TYPE_CHECKING, Any
 from table import arguments, print_result
 
 from reconros_zenoh.board.board import Board
-from reconros_zenoh.board.endpoints import Event, Source
 from reconros_zenoh.board.executor import Executor
 from reconros_zenoh.board.profile import read_profile
+from reconros_zenoh.board.sources import Event, Source
 from reconros_zenoh.board.spans import Timeline
 from reconros_zenoh.clock.process import tune_process
 from reconros_zenoh.clock.virtual import succeed_once

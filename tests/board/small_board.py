@@ -6,8 +6,8 @@ from functools import cache
 from typing import TYPE_CHECKING, Any
 
 from reconros_zenoh.board.board import Board, SlotPlan
-from reconros_zenoh.board.endpoints import Event, Source
 from reconros_zenoh.board.profile import Profile
+from reconros_zenoh.board.sources import Event, Source
 from reconros_zenoh.board.spans import Timeline
 from reconros_zenoh.clock.activity import Activity
 from reconros_zenoh.clock.virtual import VirtualEnvironment

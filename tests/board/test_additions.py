@@ -10,18 +10,19 @@ from small_board import Tickets, ignore, logging_thread, small_board, small_prof
 
 from reconros_zenoh.board.actions import ActionClientSource, ActionSource
 from reconros_zenoh.board.clients import ClientSource
-from reconros_zenoh.board.endpoints import ServiceSource, SubscriptionSource, TimerSource, TopicWriter
 from reconros_zenoh.board.executor import Executor
 from reconros_zenoh.board.hmt import FifoPlan, HmtSource, HmtWriter
 from reconros_zenoh.board.kernel import Kernel
 from reconros_zenoh.board.profile import read_profile
+from reconros_zenoh.board.sources import ServiceSource, SubscriptionSource, TimerSource
+from reconros_zenoh.board.writers import TopicWriter
 from reconros_zenoh.errors import UsageError
 from reconros_zenoh.executor.callbacks import CallbackKind
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from reconros_zenoh.board.endpoints import Source
+    from reconros_zenoh.board.sources import Source
 
 TMR, SUB, SRV, CLT = CallbackKind
 WORD = types().message("std_msgs/msg/UInt32")

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from small_board import desktop, small_board, small_profile, types
 
-from reconros_zenoh.board.endpoints import SubscriptionSource, TopicWriter
+from reconros_zenoh.board.sources import SubscriptionSource
 from reconros_zenoh.board.spans import Timeline
+from reconros_zenoh.board.writers import TopicWriter
 from reconros_zenoh.ros.qos import Durability, History, QosProfile, Reliability
 
 WORD = types().message("std_msgs/msg/UInt32")

@@ -8,17 +8,17 @@ from typing import TYPE_CHECKING, Any
 import pytest
 from small_board import desktop, small_board, small_profile, types
 
-from reconros_zenoh.board.endpoints import SubscriptionSource, TimerSource
 from reconros_zenoh.board.executor import Executor
 from reconros_zenoh.board.hmt import FifoPlan, HmtSource, HmtWriter
+from reconros_zenoh.board.sources import SubscriptionSource, TimerSource
 from reconros_zenoh.executor.callbacks import CallbackKind
 
 if TYPE_CHECKING:
     from small_board import Steps
 
     from reconros_zenoh.board.board import Board
-    from reconros_zenoh.board.endpoints import MessageWriter
     from reconros_zenoh.board.software import SoftwareContext
+    from reconros_zenoh.board.writers import MessageWriter
 
 WORD = types().message("std_msgs/msg/UInt32")
 SUB = CallbackKind.SUB

@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 from small_board import Tickets, desktop, small_board, small_profile, start, types
 
-from reconros_zenoh.board.endpoints import ServiceSource, SubscriptionSource, TopicWriter
 from reconros_zenoh.board.executor import Executor
 from reconros_zenoh.board.hmt import FifoPlan, HmtSource, HmtWriter
+from reconros_zenoh.board.sources import ServiceSource, SubscriptionSource
 from reconros_zenoh.board.spans import Timeline
+from reconros_zenoh.board.writers import TopicWriter
 from reconros_zenoh.errors import TransportError, UsageError
 from reconros_zenoh.executor.callbacks import CallbackKind
 

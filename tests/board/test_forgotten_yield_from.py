@@ -11,10 +11,10 @@ from small_board import Tickets, small_board, small_profile, types
 
 from reconros_zenoh.board.callback import HardwareThread
 from reconros_zenoh.board.delegate_calls import DelegateCalls
-from reconros_zenoh.board.endpoints import TopicWriter
 from reconros_zenoh.board.executor import Executor
 from reconros_zenoh.board.os_resources import Mutex
 from reconros_zenoh.board.timing import Cycles
+from reconros_zenoh.board.writers import TopicWriter
 from reconros_zenoh.errors import CallbackError
 from reconros_zenoh.executor.callbacks import CallbackKind
 

@@ -12,9 +12,9 @@ import pytest
 from small_board import desktop, small_board, small_profile, start, types
 
 from reconros_zenoh.board.control import gateways
-from reconros_zenoh.board.endpoints import SubscriptionSource
 from reconros_zenoh.board.hmt import Fifo, FifoPlan
 from reconros_zenoh.board.profile import Profile, read_profile
+from reconros_zenoh.board.sources import SubscriptionSource
 from reconros_zenoh.board.spans import Timeline
 from reconros_zenoh.clock.virtual import VirtualEnvironment
 from reconros_zenoh.errors import UsageError

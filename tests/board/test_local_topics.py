@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 from small_board import desktop, small_board, small_profile, types
 
-from reconros_zenoh.board.endpoints import SubscriptionSource
 from reconros_zenoh.board.executor import Executor
 from reconros_zenoh.board.local_topics import LocalTopicWriter
+from reconros_zenoh.board.sources import SubscriptionSource
 from reconros_zenoh.board.spans import Timeline
 from reconros_zenoh.clock.activity import Activity
 from reconros_zenoh.errors import BadMessageError

@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 from small_board import desktop, small_board, stages, types
 
-from reconros_zenoh.board.endpoints import ServiceSource, SubscriptionSource, TopicWriter
 from reconros_zenoh.board.executor import Executor
 from reconros_zenoh.board.profile import read_profile
+from reconros_zenoh.board.sources import ServiceSource, SubscriptionSource
 from reconros_zenoh.board.spans import Timeline
+from reconros_zenoh.board.writers import TopicWriter
 from reconros_zenoh.clock.wall import WallEnvironment
 from reconros_zenoh.executor.callbacks import CallbackKind
 

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from small_board import Tickets, desktop, small_board, small_profile, types
 
-from reconros_zenoh.board.endpoints import ServiceSource, TopicWriter
 from reconros_zenoh.board.executor import Executor
+from reconros_zenoh.board.sources import ServiceSource
+from reconros_zenoh.board.writers import TopicWriter
 from reconros_zenoh.executor.callbacks import CallbackKind
 
 if TYPE_CHECKING:

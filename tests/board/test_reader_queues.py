@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 from small_board import desktop, small_board, small_profile, stages, start, types
 
-from reconros_zenoh.board.endpoints import ServiceSource, SubscriptionSource, TimerSource, TopicWriter, Writer
 from reconros_zenoh.board.executor import Executor
+from reconros_zenoh.board.sources import ServiceSource, SubscriptionSource, TimerSource
 from reconros_zenoh.board.spans import Timeline
+from reconros_zenoh.board.writers import TopicWriter, Writer
 from reconros_zenoh.errors import TransportError
 from reconros_zenoh.executor.callbacks import CallbackKind
 from reconros_zenoh.ros.qos import QosProfile

@@ -10,11 +10,11 @@ from small_board import Tickets, desktop, small_board, small_profile, types
 
 from reconros_zenoh.board.answers import StatusAnswer
 from reconros_zenoh.board.control import status
-from reconros_zenoh.board.endpoints import SubscriptionSource, TimerSource
 from reconros_zenoh.board.executor import Executor
 from reconros_zenoh.board.hmt import FifoPlan, HmtSource, HmtWriter
 from reconros_zenoh.board.os_resources import Mailbox, Mutex, Semaphore
 from reconros_zenoh.board.profile import read_profile
+from reconros_zenoh.board.sources import SubscriptionSource, TimerSource
 from reconros_zenoh.executor.callbacks import CallbackKind
 
 if TYPE_CHECKING:

@@ -9,11 +9,12 @@ import pytest
 from small_board import desktop, stages, types
 
 from reconros_zenoh.board.board import Board, SlotPlan
-from reconros_zenoh.board.endpoints import ServiceSource, SubscriptionSource, TimerSource, TopicWriter
 from reconros_zenoh.board.executor import Executor
 from reconros_zenoh.board.profile import Profile, read_profile
 from reconros_zenoh.board.quantity import Fraction
+from reconros_zenoh.board.sources import ServiceSource, SubscriptionSource, TimerSource
 from reconros_zenoh.board.spans import Spans
+from reconros_zenoh.board.writers import TopicWriter
 from reconros_zenoh.clock.virtual import VirtualEnvironment
 from reconros_zenoh.executor.callbacks import CallbackKind
 from reconros_zenoh.rmw.node import Context

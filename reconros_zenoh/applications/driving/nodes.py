@@ -22,9 +22,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from reconros_zenoh.board.callback import HardwareThread
-    from reconros_zenoh.board.endpoints import MessageWriter
     from reconros_zenoh.board.os_resources import Mailbox
     from reconros_zenoh.board.software import SoftwareContext
+    from reconros_zenoh.board.writers import MessageWriter
     from reconros_zenoh.clock.activity import Awaitable
     from reconros_zenoh.ros.types import TypeRegistry
 

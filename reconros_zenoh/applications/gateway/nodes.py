@@ -25,8 +25,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from reconros_zenoh.board.callback import HardwareThread
-    from reconros_zenoh.board.endpoints import MessageWriter, Source
     from reconros_zenoh.board.software import SoftwareContext
+    from reconros_zenoh.board.sources import Source
+    from reconros_zenoh.board.writers import MessageWriter
     from reconros_zenoh.clock.activity import Awaitable
     from reconros_zenoh.clock.virtual import VirtualEnvironment
     from reconros_zenoh.project.application import Application

@@ -8,8 +8,8 @@ from reconros_zenoh.board.executor import Executor
 from reconros_zenoh.executor.callbacks import CallbackKind
 
 if TYPE_CHECKING:
-    from reconros_zenoh.board.endpoints import TopicWriter
     from reconros_zenoh.board.software import SoftwareCallback, SoftwareContext
+    from reconros_zenoh.board.writers import TopicWriter
     from reconros_zenoh.project.application import Application
 
 

@@ -15,8 +15,8 @@ from reconros_zenoh.applications.roundtrip.kernels.inverse import STEPS_PER_DEGR
 from reconros_zenoh.errors import BadMessageError
 
 if TYPE_CHECKING:
-    from reconros_zenoh.board.endpoints import MessageWriter
     from reconros_zenoh.board.software import SoftwareContext
+    from reconros_zenoh.board.writers import MessageWriter
 
 
 class PidCtrl:

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Generator
 
     from reconros_zenoh.board.callback import HardwareThread
-    from reconros_zenoh.board.endpoints import MessageWriter
+    from reconros_zenoh.board.writers import MessageWriter
     from reconros_zenoh.clock.activity import Awaitable
     from reconros_zenoh.ros.types import MessageType
 

@@ -13,8 +13,8 @@ if TYPE_CHECKING:
     from collections.abc import Generator
 
     from reconros_zenoh.board.callback import HardwareThread
-    from reconros_zenoh.board.endpoints import MessageWriter
     from reconros_zenoh.board.software import SoftwareContext
+    from reconros_zenoh.board.writers import MessageWriter
     from reconros_zenoh.clock.activity import Awaitable
 
 

@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from reconros_zenoh.board.callback import HardwareThread
-    from reconros_zenoh.board.endpoints import MessageWriter
     from reconros_zenoh.board.software import SoftwareContext
+    from reconros_zenoh.board.writers import MessageWriter
     from reconros_zenoh.clock.activity import Awaitable
 
 HEIGHT, WIDTH, CHANNELS = SHAPE
