@@ -95,9 +95,15 @@ def plan(
     named: dict[str, Path] = {}
     for given in mappings:
         path = project.mapping_path(given)
-        name = project.mapping(given).name
+        read = project.mapping(given)
+        name = read.name
         if name in named:
             raise UsageError(f"two mappings are named {name!r}. Rename one of the files.")
+        if name in project.mapping_files() and read != project.mapping(name):
+            raise UsageError(
+                f"{path} is not the mapping {name!r} that the real board ran. Rename the file: the name says "
+                "which of its times stand beside ours."
+            )
         named[name] = path.resolve()
     if read_profile(profile).model is None and clock is ClockName.VIRTUAL:
         raise UsageError(

@@ -8,6 +8,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+from reconros_zenoh.board.profile import read_profile
 from reconros_zenoh.experiments.provenance import host, provenance, write_experiment, writing
 from reconros_zenoh.measure.compare import experiment_tables
 from reconros_zenoh.measure.record import read_record
@@ -90,7 +91,7 @@ def finish(plan: Plan, report: BoardReport, *, interrupted: bool) -> dict[str, A
         "clock": plan.clock,
         "requests": plan.requests,
         "seed": plan.seed,
-        **experiment_tables(_records(plan)),
+        **experiment_tables(_records(plan), modelled=read_profile(plan.profile).model is not None),
         "host": report.host(),
         "spans": {mapping: status["spans_ms"] for mapping, status in report.statuses.items()},
         "timing": {

@@ -37,17 +37,19 @@ _STYLES = {"good": "green", "fair": "yellow", "bad": "red", "": ""}
 _REFERENCE_REQUESTS = 1000
 
 
-def experiment_tables(records: Mapping[str, Mapping[str, Record]]) -> dict[str, Any]:
+def experiment_tables(
+    records: Mapping[str, Mapping[str, Record]], *, modelled: bool = True
+) -> dict[str, Any]:
     """Return `mappings`, both speedups and `accuracy` for `records[mapping][client]`.
 
     `mappings.<mapping>.<client>` is the summary with `reference_median_ms` and `median_error` (ours over the
     reference, less one; our times modulo 1 s as the paper's clients logged theirs), None where the real board
-    was not measured. A speedup is all_software over the mapping, None where either has no answer; the
-    tables `speedup_of_means` and `speedup_of_medians` are empty if all_software was not run. `accuracy` is as
-    `accuracy` returns it.
+    was not measured; the error also where no board is `modelled`. A speedup is all_software over the mapping,
+    None where either has no answer; the tables `speedup_of_means` and `speedup_of_medians` are empty if
+    all_software was not run. `accuracy` is as `accuracy` returns it.
     """
     mappings = {
-        mapping: {client: _cell(mapping, client, record) for client, record in clients.items()}
+        mapping: {client: _cell(mapping, client, record, modelled) for client, record in clients.items()}
         for mapping, clients in records.items()
     }
     return {
@@ -86,7 +88,10 @@ def accuracy(mappings: Mapping[str, Mapping[str, Mapping[str, Any]]]) -> dict[st
 def accuracy_sentence(accuracy: Mapping[str, Any]) -> str:
     """Return the accuracy in words."""
     if not accuracy["cells"]:
-        return "accuracy: none of these mappings and clients was measured on the real board."
+        return (
+            "accuracy: none of these medians can be compared with the real board's. That takes a mapping and "
+            "a client that it ran, and a profile that models a board."
+        )
     worst = accuracy["worst"]
     without_hash = accuracy["mean_absolute_error_without_hash"]
     return (
@@ -151,12 +156,12 @@ def grade(error: float | None) -> str:
     return "fair" if abs(error) <= _FAIR_ERROR else "bad"
 
 
-def _cell(mapping: str, client: str, record: Record) -> dict[str, float | int | None]:
+def _cell(mapping: str, client: str, record: Record, modelled: bool) -> dict[str, float | int | None]:
     reference = reference_cells().get(mapping, {}).get(client)
     cell = summarise(record.values_ms, record.lost, record.wrong)
     cell["reference_median_ms"] = reference.median_ms if reference else None
     cell["median_error"] = None
-    if reference and record.values_ms.size:
+    if reference and modelled and record.values_ms.size:
         logged_ms = np.median(record.values_ms % LOGGED_MODULO_MS)
         cell["median_error"] = float(logged_ms / reference.median_ms - 1)
     return cell
