@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from contextlib import ExitStack
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from board_daemon.hosting import BoardOptions
 from host_clients.daemon import ClientOptions
@@ -28,13 +28,17 @@ def run_virtual(plan: Plan, report: BoardReport, on_progress: Callable[[str, str
     """Record the round trips of each mapping; `on_progress(mapping, client)` is called after each of them."""
     profile = read_profile(plan.profile)
     for mapping, path in plan.mappings.items():
-        with ExitStack() as files:
+        with ExitStack() as files, Simulation(application().types()) as simulation:
             writers = {
                 client: files.enter_context(RecordWriter(plan.record_path(mapping, client)))
                 for client in CLIENTS
             }
             record = partial(_record, writers, partial(on_progress, mapping))
-            report.statuses[mapping] = run_mapping(profile, path, plan.requests, plan.seed, record)
+            hosted = add_board_and_clients(simulation, profile, path, plan.requests, plan.seed, record)
+            try:
+                simulation.run()
+            finally:  # an interrupted one, too, has run until now
+                report.statuses[mapping] = status(hosted.board, hosted.executor)
 
 
 def run_mapping(
@@ -43,15 +47,14 @@ def run_mapping(
     requests: int,
     seed: int,
     on_round_trip: Callable[[str, RoundTrip], None],
-) -> dict[str, Any]:
-    """Let the five clients make their round trips with a board under a mapping file; return its last status.
+) -> None:
+    """Let the five clients make their round trips with a board under a mapping file.
 
     `on_round_trip` gets the client's name with each.
     """
     with Simulation(application().types()) as simulation:
-        hosted = add_board_and_clients(simulation, profile, mapping, requests, seed, on_round_trip)
+        add_board_and_clients(simulation, profile, mapping, requests, seed, on_round_trip)
         simulation.run()
-        return status(hosted.board, hosted.executor)
 
 
 def add_board_and_clients(

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Self
 
 from deploy.compose import read_compose
 from deploy.runner import LocalRunner
+from deploy.service_run import ServiceState
 from reconros_zenoh.board.control import ask_status
 from reconros_zenoh.errors import TransportError
 from reconros_zenoh.experiments.roundtrip import ANSWER_LIMIT_S, CLIENTS, BoardReport
@@ -52,9 +53,12 @@ def run_wall(plan: Plan, report: BoardReport, on_progress: Callable[[str, str], 
                 LocalRunner(deployment, plan.folder / mapping / "logs", environment) as runner,
                 _Watch(plan, mapping, router, on_progress),
             ):
-                runner.run_until(set(CLIENTS))
-                with ZenohTransport.open(router) as transport:
-                    report.statuses[mapping] = ask_status(transport, BOARD)
+                try:
+                    runner.run_until(set(CLIENTS))
+                finally:  # an interrupted one, too, has run until now
+                    if runner.states["board"] is ServiceState.HEALTHY:
+                        with suppress(TransportError), ZenohTransport.open(router) as transport:
+                            report.statuses[mapping] = ask_status(transport, BOARD)
 
 
 class _Watch:

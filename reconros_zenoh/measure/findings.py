@@ -101,7 +101,7 @@ def host_finding(experiment: Mapping[str, Any]) -> Finding:
             "host", "time is virtual: the speed of the computer that ran this has no part in the figures."
         )
     if experiment["host"]["lag_p50_us"] is None:
-        return Finding("host", "whether it kept up is not known: no board came to tell.", warning=True)
+        return Finding("host", "whether it kept up is not known: no board has told it.", warning=True)
     troubles = host_troubles(experiment["host"])
     if not troubles:
         return Finding("host", "it kept up with the modelled times: no overrun.")

@@ -182,7 +182,9 @@ def _commands(children: list[psutil.Process]) -> list[str]:
 def _interrupted(folder: Path, clock: str) -> dict[str, Any]:
     experiment: dict[str, Any] = json.loads((folder / clock / "experiment.json").read_text(encoding="utf-8"))
     assert experiment["interrupted"] is True
-    assert experiment["host"]["overruns"] is None  # no board was asked
+    assert experiment["host"]["overruns"] is not None
+    assert experiment["spans"]["all_hardware"]
+    assert experiment["timing"].keys() == {"all_hardware"}
     cells: dict[str, Any] = experiment["mappings"]["all_hardware"]
     return cells
 
