@@ -12,6 +12,7 @@ import sys
 import time
 from io import TextIOWrapper
 from pathlib import Path
+from typing import NoReturn
 
 import typer
 
@@ -66,7 +67,11 @@ def main() -> None:
     given = sys.argv[1] if len(sys.argv) > 1 else ""
     try:
         try:
-            _application([given] if given in _VERBS else list(_VERBS))(prog_name="reconros")
+            verbs = [given] if given in _VERBS else list(_VERBS)
+            sys.exit(_application(verbs)(prog_name="reconros", standalone_mode=False))
+        except typer.TyperException as error:
+            error.show()  # type: ignore[attr-defined] # those of the command line have it
+            _end(error.format_message(), error.exit_code)
         except (UsageError, TransportError) as error:
             _fail(error, 2)
         except ReconrosError as error:
@@ -109,10 +114,15 @@ def _application(verbs: list[str]) -> typer.Typer:
     return application
 
 
-def _fail(error: ReconrosError, status: int) -> None:
+def _fail(error: ReconrosError, status: int) -> NoReturn:
     print(f"reconros: {printable(str(error))}", file=sys.stderr)
+    _end(str(error), status)
+
+
+def _end(error: str, status: int) -> NoReturn:
+    """Exit after an error that stderr has heard of."""
     if "--json" in sys.argv:
-        print(json.dumps({"error": str(error)}), flush=True)
+        print(json.dumps({"error": error}), flush=True)
     sys.exit(status)
 
 

@@ -94,6 +94,24 @@ def test_an_error_is_an_object_where_json_is_asked_for() -> None:
     assert "nowhere: cannot be read" in line
 
 
+@pytest.mark.parametrize(
+    ("words", "error"),
+    [
+        (
+            "experiment roundtrip --requests 0",
+            "Invalid value for '--requests': Input should be greater than or equal to 1",
+        ),
+        ("hist", "Missing argument 'DIR|FILE...'."),
+        ("reconstruct", "No such command 'reconstruct'."),
+    ],
+)
+def test_an_error_in_the_arguments_is_one_too(words: str, error: str) -> None:
+    done = reconros(f"{words} --json")
+    assert (done.returncode, json.loads(done.stdout)) == (2, {"error": error})
+    assert done.stderr.startswith("Usage: reconros")
+    assert done.stderr.endswith(f"Error: {error}\n")
+
+
 def test_an_error_does_not_tell_the_terminal_what_to_do() -> None:
     done = reconros("map \"$(printf '\\033]0;mine\\007.yaml')\"")
     assert done.returncode == 2
