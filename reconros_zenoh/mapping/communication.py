@@ -55,7 +55,7 @@ def _decide(graph: ComputationGraph, topic: Topic) -> Decision:
     return Decision(
         TopicMapping.SOFTWARE,
         f"Ends on both sides, but {'one subscriber' if readers else 'no subscriber'} in hardware: "
-        "a gateway would save no transfer.",
+        "the method gives a gateway to more than one, whatever publishes.",
     )
 
 

@@ -54,6 +54,8 @@ def test_the_example_of_the_paper() -> None:
         ("h", "", TopicMapping.HARDWARE, "All ends are in hardware"),
         ("h", "s", TopicMapping.SOFTWARE, "no subscriber in hardware"),
         ("s", "h", TopicMapping.SOFTWARE, "one subscriber in hardware"),
+        # Here a gateway would save a transfer, which the method does not look at.
+        ("h", "is", TopicMapping.SOFTWARE, "gives a gateway to more than one, whatever publishes"),
         ("hs", "i", TopicMapping.SOFTWARE, "one subscriber in hardware"),
         ("s", "hi", TopicMapping.GATEWAY, "2 subscribers in hardware"),
         ("h", "ijs", TopicMapping.GATEWAY, "2 subscribers in hardware"),
