@@ -11,7 +11,7 @@ import typer
 
 from board_daemon.hosting import BoardOptions
 from reconros_zenoh.board.control import status
-from reconros_zenoh.cli.console import wide_console
+from reconros_zenoh.cli.console import interrupted, wide_console
 from reconros_zenoh.cli.options import (
     ENDPOINT,
     AsJson,
@@ -58,7 +58,7 @@ def run(
 ) -> None:
     """Run a project on an emulated board of its TargetBoard.
 
-    At the end it shows what the board has done.
+    At the end, or at Ctrl-C, it shows what the board has done.
     """
     with project_prints(as_json=as_json):
         loaded = load_project(project)
@@ -66,7 +66,8 @@ def run(
         mapped = loaded.mapping(mapping)
         options = BoardOptions(name, domain, seed, bitstreams)
         if clock is ClockName.VIRTUAL:
-            done = _run_virtual(model, loaded, mapped, options, seconds or _VIRTUAL_S)
+            seconds = seconds or _VIRTUAL_S
+            done = _run_virtual(model, loaded, mapped, options, seconds)
         else:
             from board_daemon.daemon import run_board
 
@@ -79,14 +80,17 @@ def run(
                     )
 
             done = run_board(router, model, loaded, mapped, options, on_ready, seconds)
+    early = seconds is not None and done["elapsed_ms"] < round(seconds * 1e9) / 1e6
     if as_json:
-        print(json.dumps(done))
+        print(json.dumps(done | {"interrupted": early}))
     else:
         print_status(wide_console(), done)
         if model.model is None and clock is ClockName.VIRTUAL:
             print(
                 f"{model.name} models nothing, so nothing took any time. --profile chooses a board that does."
             )
+    if early:
+        raise interrupted(quiet=as_json)
 
 
 def _run_virtual(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import signal
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -72,7 +73,7 @@ def test_it_runs_at_once_in_the_first_mapping_of_its_folder(
     blink: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     status = run(blink, "--seconds", 1.05)
-    assert status["profile"] == "native"
+    assert (status["profile"], status["interrupted"]) == ("native", False)
     count = status["callbacks"]["count"]
     assert (count["kind"], count["software"], count["slots"]) == ("TMR", False, [0])
     assert (count["calls"], count["failed"], count["dropped"]) == (10, 0, 0)
@@ -95,6 +96,23 @@ def test_the_text_ends_with_the_status(blink: Path) -> None:
     output = invoke("run", blink, "--clock", "virtual", "--seconds", 0.25)
     (row,) = [line.split() for line in output.splitlines() if line.startswith("count  ") and "TMR" in line]
     assert row[-3:] == ["2", "0", "0"]  # calls, failed, dropped
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_interrupted_it_shows_what_it_has_done_and_says_so(blink: Path, number: signal.Signals) -> None:
+    called = "self.count += 1"
+    stops = f"if self.count == 3: __import__('signal').raise_signal({number:d})"
+    replace(blink / "callbacks.py", called, f"{called}\n        {stops}")
+    former = signal.signal(number, signal.default_int_handler)
+    try:
+        arguments = ["run", str(blink), "--clock", "virtual", "--seconds", "1e9"]
+        text, as_json = (CliRunner().invoke(application, [*arguments, *more]) for more in ([], ["--json"]))
+    finally:
+        signal.signal(number, former)
+    assert (text.exit_code, as_json.exit_code) == (130, 130)
+    assert text.stdout.endswith("interrupted before its end\n")
+    status = json.loads(as_json.stdout)
+    assert (status["interrupted"], status["callbacks"]["count"]["calls"]) == (True, 3)
 
 
 def test_times_of_nothing_are_explained(blink: Path) -> None:
