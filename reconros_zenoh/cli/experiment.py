@@ -90,7 +90,13 @@ def plan(
 ) -> Plan:
     """Return the plan of an experiment; raise UsageError for a mapping or profile that cannot be used."""
     from reconros_zenoh.board.profile import read_profile
+    from reconros_zenoh.experiments.simulation import check_hosting
 
+    board = read_profile(profile)
+    if board.model is None and clock is ClockName.VIRTUAL:
+        raise UsageError(
+            f"profile {profile!r} models nothing, so nothing would take any virtual time. Use --clock wall."
+        )
     project = application()
     named: dict[str, Path] = {}
     for given in mappings:
@@ -104,11 +110,8 @@ def plan(
                 f"{path} is not the mapping {name!r} that the real board ran. Rename the file: the name says "
                 "which of its times stand beside ours."
             )
+        check_hosting(board, project, read)
         named[name] = path.resolve()
-    if read_profile(profile).model is None and clock is ClockName.VIRTUAL:
-        raise UsageError(
-            f"profile {profile!r} models nothing, so nothing would take any virtual time. Use --clock wall."
-        )
     return Plan(clock.value, named, requests, seed, profile, out)
 
 

@@ -8,7 +8,7 @@ from functools import lru_cache
 from itertools import count
 from typing import TYPE_CHECKING, Self
 
-from board_daemon.hosting import HostedBoard
+from board_daemon.hosting import BoardOptions, HostedBoard
 from host_clients.camera import Camera
 from host_clients.closed_loop import ClosedLoop
 from host_clients.group import gather
@@ -29,7 +29,6 @@ if TYPE_CHECKING:
     import simpy
     from numpy.typing import NDArray
 
-    from board_daemon.hosting import BoardOptions
     from host_clients.camera import CameraOptions
     from host_clients.daemon import ClientOptions
     from host_clients.robot import RobotOptions
@@ -155,6 +154,12 @@ class Simulation:
             self.environment.run(until=self.environment.all_of(self._done))
         else:
             self.environment.run(until=round(seconds * 1e9))
+
+
+def check_hosting(profile: Profile, project: Project, mapping: Mapping) -> None:
+    """Raise UsageError or FileError when no board of this kind can host the project under this mapping."""
+    with Simulation(project.types()) as simulation:
+        simulation.add_board(profile, project, mapping, BoardOptions())
 
 
 def _check_answered(loop: ClosedLoop, options: ClientOptions) -> None:

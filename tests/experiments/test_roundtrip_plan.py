@@ -19,8 +19,10 @@ if TYPE_CHECKING:
 SHIPPED = application_folder() / "mappings" / "all_hardware.toml"
 
 
-def planned(mapping: Path, folder: Path, profile: str = "miniitx-zynq7100") -> Plan:
-    return plan(ClockName.VIRTUAL, [str(mapping)], 5, 0, folder, profile)
+def planned(
+    mapping: Path, folder: Path, profile: str = "miniitx-zynq7100", clock: ClockName = ClockName.VIRTUAL
+) -> Plan:
+    return plan(clock, [str(mapping)], 5, 0, folder, profile)
 
 
 def test_a_mapping_of_ones_own_is_not_named_like_a_measured_one(tmp_path: Path) -> None:
@@ -47,3 +49,12 @@ def test_what_models_no_board_is_not_compared_with_one(tmp_path: Path, profile: 
     assert (cell["median_error"] is None) == (cells == 0)
     assert experiment["accuracy"]["cells"] == cells
     assert ("a profile that models a board" in accuracy_sentence(experiment["accuracy"])) == (cells == 0)
+
+
+@pytest.mark.parametrize("clock", ClockName)
+def test_a_board_that_cannot_host_the_callbacks_is_refused_in_either_clock(
+    tmp_path: Path, clock: ClockName
+) -> None:
+    with pytest.raises(UsageError, match="profile 'zcu104' has no times for callback 'inverse'"):
+        planned(SHIPPED, tmp_path, "zcu104", clock)
+    assert not list(tmp_path.iterdir())
