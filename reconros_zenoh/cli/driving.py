@@ -46,6 +46,7 @@ def driving(
     """
     from reconros_zenoh.board.profile import read_profile
     from reconros_zenoh.experiments.driving import (
+        FILES,
         VARIANTS,
         check_profile,
         run_variant,
@@ -60,7 +61,8 @@ def driving(
     drives = {}
     with own_folder(out):
         with writing(out):
-            for name in (*(f"{variant}.csv" for variant in VARIANTS), "experiment.json", _DRAWING):
+            parts = (f"{variant}/{file}" for variant in VARIANTS for file in FILES)
+            for name in (*parts, "experiment.json", _DRAWING):
                 (out / name).unlink(missing_ok=True)
         with (
             run_bar("driving", len(VARIANTS), quiet=as_json) as advance,

@@ -23,13 +23,13 @@ from reconros_zenoh.experiments.simulation import Simulation
 from reconros_zenoh.mapping.apply import apply_mapping
 from reconros_zenoh.mapping.communication import TopicMapping, map_topics
 from reconros_zenoh.mapping.project_graph import read_project_graph
+from reconros_zenoh.measure.record import RecordWriter, RoundTrip
 from reconros_zenoh.project.loader import Project, read_project
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from reconros_zenoh.board.profile import Profile
-    from reconros_zenoh.measure.record import RoundTrip
     from reconros_zenoh.project.loader import ProjectFiles
 
 VARIANTS: dict[str, frozenset[TopicMapping]] = {
@@ -46,6 +46,9 @@ _PAPER_MS = {"hardware_topics": (28.264, 3.21), "gateways": (20.270, 0.239)}
 """Mean and standard deviation of the chain."""
 
 _REACTION_S = 0.5
+
+FILES = ("chain.csv", "robot.csv", "pictures.tsv")
+"""What there is of each variant, in a folder of its name."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,15 +156,29 @@ def troubles(experiment: Mapping[str, Any]) -> list[str]:
 
 
 def write_records(folder: Path, drives: Mapping[str, Drive]) -> None:
-    """Write each variant's pictures as rows of <variant>.csv."""
+    """Write the FILES of each variant: records of the chain and of the loop, and a row for each picture."""
     for name, drive in drives.items():
-        path = folder / f"{name}.csv"
-        with writing(path), path.open("w", newline="", encoding="utf-8") as file:
-            table = csv.writer(file)
-            table.writerow(("picture", *Step._fields, "loop_ms", *SECTIONS))
-            for number, step in enumerate(drive.steps):
-                sections = drive.sections_ms.get(number, [""] * len(SECTIONS))
-                table.writerow((number, *step, drive.loop_ms.get(number, ""), *sections))
+        with writing(folder / name):
+            chain, robot, table = (folder / name / file for file in FILES)
+            _write_record(chain, len(drive.steps), {n: sum(ms) for n, ms in drive.sections_ms.items()})
+            _write_record(robot, len(drive.steps), drive.loop_ms)
+            with table.open("w", newline="", encoding="utf-8") as file:
+                rows = csv.writer(file, "excel-tab")
+                rows.writerow(("picture", *Step._fields, "loop_ms", *SECTIONS))
+                for number, step in enumerate(drive.steps):
+                    sections = drive.sections_ms.get(number, [""] * len(SECTIONS))
+                    rows.writerow((number, *step, drive.loop_ms.get(number, ""), *sections))
+
+
+def _write_record(path: Path, pictures: int, times_ms: Mapping[int, float]) -> None:
+    with RecordWriter(path) as record:
+        for number in range(1, pictures):
+            time_ms = times_ms.get(number)
+            record.write(
+                RoundTrip(number, None, "lost")
+                if time_ms is None
+                else RoundTrip(number, round(time_ms * 1e6), "ok")
+            )
 
 
 def _variant(name: str, drive: Drive) -> dict[str, Any]:

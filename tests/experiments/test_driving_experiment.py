@@ -37,6 +37,7 @@ from reconros_zenoh.experiments.simulation import Simulation
 from reconros_zenoh.mapping.communication import Crossings, map_topics
 from reconros_zenoh.mapping.project_graph import read_project_graph
 from reconros_zenoh.measure.driving_plots import driving_figure
+from reconros_zenoh.measure.record import find_records, read_record, short_names
 from reconros_zenoh.project.loader import load_project, read_project
 from reconros_zenoh.ros.image import image_message
 from reconros_zenoh.ros.types import TypeRegistry
@@ -198,12 +199,28 @@ def test_what_is_told_of_a_drive() -> None:
 
 def test_a_row_of_a_record_belongs_to_one_picture(tmp_path: Path) -> None:
     write_records(tmp_path, {"gateways": made_up([0.0] * 4, [0.0, 0.1, 0.2, 0.3], [True] * 4)})
-    with (tmp_path / "gateways.csv").open() as file:
-        rows = list(csv.DictReader(file))
+    with (tmp_path / "gateways" / "pictures.tsv").open() as file:
+        rows = list(csv.DictReader(file, dialect="excel-tab"))
     assert [row["picture"] for row in rows] == ["0", "1", "2", "3"]
     assert [row["speed"] for row in rows] == ["0.0", "0.1", "0.2", "0.3"]
     assert [row["loop_ms"] for row in rows] == ["", "40.0", "50.0", "90.0"]
     assert [row[SECTIONS[0]] for row in rows] == ["", "5.0", "10.0", "30.0"]
+
+
+def test_its_times_are_records_with_the_same_names_under_each_variant(tmp_path: Path) -> None:
+    measured = made_up([0.0] * 4, [0.0] * 4, [True] * 4)
+    del measured.loop_ms[2]
+    write_records(tmp_path, {"all_software": measured, "gateways": measured})
+    paths = find_records(tmp_path)
+    assert short_names(paths) == [
+        "all_software/chain",
+        "all_software/robot",
+        "gateways/chain",
+        "gateways/robot",
+    ]
+    chain, robot = (read_record(path) for path in paths[:2])
+    assert (chain.values_ms.tolist(), chain.lost) == ([20.0, 30.0, 70.0], 0)
+    assert (robot.values_ms.tolist(), robot.lost) == ([40.0, 90.0], 1)
 
 
 def test_the_table_has_what_the_object_has(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -342,12 +359,12 @@ def test_the_command_writes_records_object_and_drawing(tmp_path: Path) -> None:
     assert printed == json.loads((tmp_path / "experiment.json").read_text())
     assert printed["variants"] == experiment()["variants"]
     assert {path.name for path in tmp_path.iterdir()} == {
-        *(f"{name}.csv" for name in VARIANTS),
+        *VARIANTS,
         "experiment.json",
         "driving.png",
     }
-    with (tmp_path / "gateways.csv").open() as file:
-        rows = list(csv.DictReader(file))
+    with (tmp_path / "gateways" / "pictures.tsv").open() as file:
+        rows = list(csv.DictReader(file, dialect="excel-tab"))
     assert len(rows) == PICTURES
     assert rows[0]["loop_ms"] == ""
     assert float(rows[1]["loop_ms"]) == drive("gateways").loop_ms[1]
