@@ -46,13 +46,14 @@ def check(
 ) -> None:
     """Show what a ReconROS project file says.
 
-    What a folder holds in msg/ and mappings/ is read too. Exit status 2 when the project cannot be used.
+    What a folder holds in msg/ and mappings/ is read too. Exit status 2 when the project cannot be used under
+    each of its mappings, or without any under its default.
     """
     if project.is_dir():
         files = read_project(project)
         files.types()
-        for name in files.mapping_files():
-            files.mapping(name)
+        for refused in files.unusable_mappings().values():
+            raise refused
         configuration = files.configuration
     else:
         configuration = read_build_cfg(project)

@@ -106,9 +106,13 @@ class ProjectFiles:
         return mapping
 
     def unusable_mappings(self) -> dict[Path, FileError]:
-        """Return those of the mapping files that the project refuses, each with why."""
+        """Return those of the mapping files that the project refuses, each with why.
+
+        Without mapping files the default counts as one, of the name of build.cfg.
+        """
         refused = {}
-        for name, path in self.mapping_files().items():
+        default = None, self.configuration.path
+        for name, path in (*self.mapping_files().items(),) or (default,):
             try:
                 self.mapping(name)
             except FileError as error:

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping as Map
     from pathlib import Path
 
-    from reconros_zenoh.project.build_cfg import BuildConfiguration
+    from reconros_zenoh.project.build_cfg import BuildConfiguration, ReconosThread
 
 _Count = Annotated[StrictInt, Field(ge=0, le=1000)]
 
@@ -49,17 +49,29 @@ class Mapping(BaseModel):
         """Return the mapping of a project without mapping files: what can be in hardware is, all else not.
 
         A callback gets all reconfigurable slots that it is built for; without any, the first other slot that
-        no callback before it has. A gateway's slot is the gateway's.
+        no callback before it has. A gateway's slot is the gateway's. Raise FileError for a callback that has
+        no SwSource, and finds all its slots taken.
         """
         reconfigurable = {slot.id for slot in configuration.slots if slot.reconfigurable}
-        gateways = set(gateway_slots(configuration, {}).values())
-        taken = set(gateways)
+        built = built_for(configuration)
+        gateways = gateway_slots(configuration, {})
+        taken = {
+            gateways[gateway.name]: f"the gateway {gateway.name} (line {gateway.line})"
+            for gateway in configuration.gateways
+        }
         callbacks: dict[str, CallbackMapping] = {}
-        for name, slots in built_for(configuration).items():
-            own = tuple(slot for slot in slots if slot in reconfigurable - gateways)
-            own = own or tuple(slot for slot in slots if slot not in taken)[:1]
-            taken.update(set(own) - reconfigurable)
-            callbacks[name] = CallbackMapping(software=not own, slots=own)
+        for thread in configuration.threads:
+            slots = built[thread.name]
+            own = tuple(slot for slot in slots if slot not in taken)
+            own = tuple(slot for slot in own if slot in reconfigurable) or own[:1]
+            if slots and not own and not thread.software:
+                raise _no_place(configuration, thread, taken)
+            taken |= {
+                slot: f"the callback {thread.name} (line {thread.line})"
+                for slot in own
+                if slot not in reconfigurable
+            }
+            callbacks[thread.name] = CallbackMapping(software=not own, slots=own)
         return cls(
             name="default",
             executor="reconros",
@@ -72,6 +84,17 @@ class Mapping(BaseModel):
 def built_for(configuration: BuildConfiguration) -> dict[str, tuple[int, ...]]:
     """Return the ids of the slots that each callback is built for in hardware."""
     return {thread.name: thread.slots if thread.hardware else () for thread in configuration.threads}
+
+
+def _no_place(configuration: BuildConfiguration, thread: ReconosThread, taken: Map[int, str]) -> FileError:
+    names = {slot.id: slot.name for slot in configuration.slots}
+    holders = " and ".join(f"{names[slot]} is that of {taken[slot]}" for slot in thread.slots)
+    return FileError(
+        configuration.path,
+        thread.line,
+        f"The callback {thread.name} has no slot left, and no SwSource: {holders}.",
+        "Name another slot for one of them, or give the callback a SwSource.",
+    )
 
 
 def read_mapping(path: Path, callbacks: Map[str, Collection[int]], slots: Collection[int]) -> Mapping:

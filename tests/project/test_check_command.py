@@ -18,6 +18,7 @@ from reconros_zenoh.errors import FileError
 from reconros_zenoh.experiments.roundtrip import application_folder
 from reconros_zenoh.project.build_cfg import read_build_cfg
 from reconros_zenoh.project.resources import slot_resources
+from reconros_zenoh.project.template import new_project
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -140,6 +141,23 @@ def test_a_folder_is_read_with_its_interfaces(tmp_path: Path) -> None:
     with pytest.raises(FileError, match=r"T\.msg:1: 'uint33' is no type"):
         run(tmp_path)
     assert facts(tmp_path / "build.cfg")["name"] == "x"
+
+
+def test_a_folder_is_read_with_the_mapping_that_run_would_take(tmp_path: Path) -> None:
+    folder = tmp_path / "blink"
+    new_project(folder)
+    path = folder / "build.cfg"
+    text = path.read_text(encoding="utf-8")
+    path.write_text(
+        text.replace('node, count_msg, "/count"', "node, blink_msgs/Count, /count, hw"), encoding="utf-8"
+    )
+    with pytest.raises(FileError, match=r"build\.cfg:22: The callback count is mapped to software"):
+        run(folder)
+    shutil.rmtree(folder / "mappings")
+    assert facts(folder)["name"] == "blink"  # in hardware, as it is built for
+    path.write_text(path.read_text(encoding="utf-8").replace("HwSource = hls\n", ""), encoding="utf-8")
+    with pytest.raises(FileError, match=r"build\.cfg:22: The callback count is mapped to software"):
+        run(folder)
 
 
 def test_the_text_shows_everything(wild: Path, expected: Any) -> None:

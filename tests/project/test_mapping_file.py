@@ -66,7 +66,7 @@ def test_without_a_file_what_can_be_in_hardware_is(tmp_path: Path) -> None:
         "[ReconosThread@both]\nSlot = s(*), fixed(0)\nHwSource = hls\nSwSource = c\n"
         "[ReconosThread@soft]\nSlot = s(*)\nSwSource = c\n"
         "[ReconosThread@static]\nSlot = fixed(0)\nHwSource = hls\n"
-        "[ReconosThread@late]\nSlot = fixed(0)\nHwSource = hls\n"
+        "[ReconosThread@late]\nSlot = fixed(0)\nHwSource = hls\nSwSource = c\n"
         "[ReconosThread@nowhere]\nHwSource = hls\n",
         encoding="utf-8",
     )
@@ -83,6 +83,28 @@ def test_without_a_file_what_can_be_in_hardware_is(tmp_path: Path) -> None:
             "nowhere": CallbackMapping(software=True),
         },
     )
+
+
+def test_without_a_file_who_has_the_slots_of_a_callback_that_can_be_nowhere_else_is_named(
+    tmp_path: Path,
+) -> None:
+    path = tmp_path / "build.cfg"
+    path.write_text(
+        "[General]\nName = x\nPartialReconfiguration = true\n"
+        "[HwSlot@s(0:0)]\nId = 4\nReconfigurable = true\nRegion_0 = SLICE_X0Y0:SLICE_X1Y1\n"
+        "[HwSlot@fixed(0:0)]\nId = 9\n"
+        "[ReconosThread@first]\nSlot = fixed(0)\nHwSource = hls\n"
+        "[ReconosThread@late]\nSlot = s(0), fixed(0)\nHwSource = hls\n"
+        "[ROSGateway@g]\nSlot = s(0)\nHWTopic = /a\nSWTopic = /a\nMsgType = std_msgs/UInt32\n",
+        encoding="utf-8",
+    )
+    with pytest.raises(FileError) as refused:
+        Mapping.default(read_build_cfg(path))
+    assert refused.value.line == 13
+    assert (
+        "The callback late has no slot left, and no SwSource: s(0) is that of the gateway g (line 16) and "
+        "fixed(0) is that of the callback first (line 10)."
+    ) in str(refused.value)
 
 
 MISTAKES = {
