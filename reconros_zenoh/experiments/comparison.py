@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import closing
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -103,7 +104,7 @@ def run_mapping(
     Raise UsageError when the board cannot host it. Ages are those of the last 10,000 messages of a topic.
     """
     types = project.types()
-    with Simulation(types) as simulation:
+    with Simulation(types) as simulation, closing(stimulus.schedule()) as schedule:
         hosted = simulation.add_board(profile, project, mapping, BoardOptions(seed=seed))
         desktop = simulation.context().node("desktop")
         for topic, name in outputs.items():
@@ -112,7 +113,7 @@ def run_mapping(
             topic: desktop.publisher(types.message(name), topic) for topic, name in stimulus.types.items()
         }
         environment = simulation.environment
-        environment.process(feed(environment, publishers, stimulus.schedule()))
+        environment.process(feed(environment, publishers, schedule))
         environment.run(until=round(seconds * 1e9))
         ages_ns: dict[str, list[int]] = {topic: [] for topic in outputs}
         for writer in hosted.board.writers:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import heapq
+from contextlib import closing
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 from rosbags.rosbag2 import Reader, ReaderError
@@ -13,7 +14,7 @@ from reconros_zenoh.errors import UsageError
 from reconros_zenoh.ros.zero_message import message_of
 
 if TYPE_CHECKING:
-    from collections.abc import Generator, Iterator, Mapping, Sequence
+    from collections.abc import Generator, Mapping, Sequence
     from pathlib import Path
 
     import simpy
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
     from reconros_zenoh.ros.types import TypeRegistry
     from reconros_zenoh.transport.base import Parts
 
-    Schedule: TypeAlias = Iterator[tuple[int, str, Parts]]
+    Schedule: TypeAlias = Generator[tuple[int, str, Parts], None, None]
 
 _S = 1_000_000_000
 
@@ -40,7 +41,10 @@ class Stimulus(NamedTuple):
     bag: Path | None
 
     def schedule(self) -> Schedule:
-        """Yield the time [ns], topic and encoded message of each in the order of time, perhaps for ever."""
+        """Yield the time [ns], topic and encoded message of each in the order of time, perhaps for ever.
+
+        To be closed, if it is not gone through to its end.
+        """
         played = [] if self.bag is None else [self._recorded(self.bag)]
         count = len(self.periodic)
         # Not all at once: publishers that know nothing of each other would not be, either.
@@ -48,7 +52,7 @@ class Stimulus(NamedTuple):
             self._repeated(topic, self.period_ns * number // count)
             for number, topic in enumerate(self.periodic, start=1)
         )
-        return heapq.merge(*periodic, *played, key=lambda message: message[0])
+        yield from heapq.merge(*periodic, *played, key=lambda message: message[0])
 
     def _repeated(self, topic: str, at_ns: int) -> Schedule:
         while True:
@@ -60,8 +64,12 @@ class Stimulus(NamedTuple):
             connections = [
                 each for each in bag.connections if each.topic in self.types.keys() - self.periodic.keys()
             ]
-            for connection, at_ns, payload in bag.messages(connections):
-                yield at_ns - bag.start_time, connection.topic, (payload,)
+            if not connections:  # of none it would yield all
+                return
+            # Closed before the bag, which cannot be while somebody reads: a run may end before its recording.
+            with closing(bag.messages(connections)) as messages:
+                for connection, at_ns, payload in messages:
+                    yield at_ns - bag.start_time, connection.topic, (payload,)
 
 
 def read_inputs(inputs: Sequence[str], known: Mapping[str, str], types: TypeRegistry) -> dict[str, Parts]:

@@ -117,11 +117,12 @@ def test_a_recording_is_played_at_its_own_times(tmp_path: Path) -> None:
 
 
 def test_an_input_goes_before_the_recording_of_its_topic(tmp_path: Path) -> None:
-    bag = write_bag(tmp_path / "bag", [("/angle", WORD, at_ms, {"data": 80}) for at_ms in (0, 500)])
-    told = round_trips(
-        tmp_path / "out", "--bag", bag, "--input", "/angle", "--rate", 20, "--mapping", "mixed"
-    )
-    assert told["mappings"]["mixed"]["outputs"]["/legangle"]["sent"] >= 9
+    messages = [("/angle", WORD, at_ms, {"data": 80}) for at_ms in (0, 500)]
+    bag = write_bag(tmp_path / "bag", [*messages, ("/other", WORD, 100, {})])
+    given = ("--input", "/angle", "--rate", 20, "--mapping", "mixed", "--seconds", 0.5)
+    alone, beside = (round_trips(tmp_path / "out", *given, *more) for more in ((), ("--bag", bag)))
+    assert alone["mappings"] == beside["mappings"]
+    assert beside["mappings"]["mixed"]["outputs"]["/legangle"]["sent"] == 9
 
 
 def test_a_project_that_drives_itself_needs_no_input(tmp_path: Path) -> None:
