@@ -30,9 +30,6 @@ if TYPE_CHECKING:
 
     from rich.console import Console
 
-    from reconros_zenoh.project.loader import Project
-    from reconros_zenoh.project.mapping_file import Mapping as CallbackMapping
-
 _DRAWING = "compare.png"
 _SECONDS = 10.0
 
@@ -87,7 +84,7 @@ def compare(
                 f"profile {model.name!r} models nothing, so nothing would take any time. Choose a board that "
                 "does with --profile."
             )
-        mappings = _mappings(loaded, mapping)
+        mappings = loaded.mappings(mapping or [*loaded.mapping_files()] or [None])
         first, *_ = mappings.values()
         known, outputs = (outside_topics(loaded.configuration, first, kind) for kind in ("rossub", "rospub"))
         messages = read_inputs(inputs or [], known, loaded.types())
@@ -132,17 +129,6 @@ def compare(
         raise interrupted(quiet=as_json, measured=bool(runs))
 
 
-def _mappings(project: Project, given: list[str] | None) -> dict[str, CallbackMapping]:
-    """Return the mappings that are asked for by name; raise UsageError for two of one name."""
-    mappings: dict[str, CallbackMapping] = {}
-    for name in given or [*project.mapping_files()] or (None,):
-        mapping = project.mapping(name)
-        if mapping.name in mappings:
-            raise UsageError(f"two mappings are named {mapping.name!r}. Rename one of the files.")
-        mappings[mapping.name] = mapping
-    return mappings
-
-
 def _draw(path: Path, runs: Mapping[str, MappingRun]) -> bool:
     """Draw what there is; return whether there was anything."""
     ages_ms = {
@@ -171,11 +157,11 @@ def _print(console: Console, experiment: Mapping[str, Any]) -> None:
                 figures = (format_ms(output[f"{figure}_ms"]) for figure in ("median", "p95", "p99", "max"))
                 ages.add_row(Text(topic), Text(name), f"{output['rate_hz']:.4g}", *figures)
             ages.add_section()
-    console.print(ages)
-    console.print(
-        "age: since the message or timer that it follows from, until it is over the link", style="dim"
-    )
-    console.print()
+    if ages.row_count:
+        console.print(ages)
+        told = "age: since the message or timer that it follows from, until it is over the link"
+        console.print(told, style="dim")
+        console.print()
     boards = titled_table("what became of the messages, and of the slots", 1)
     boards.add_column("mapping", overflow="fold")
     for column in ("lost", "refused", "failed", "swaps"):

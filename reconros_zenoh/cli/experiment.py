@@ -99,12 +99,8 @@ def plan(
         )
     project = application()
     named: dict[str, Path] = {}
-    for given in mappings:
+    for given, (name, read) in zip(mappings, project.mappings(mappings).items(), strict=True):
         path = project.mapping_path(given)
-        read = project.mapping(given)
-        name = read.name
-        if name in named:
-            raise UsageError(f"two mappings are named {name!r}. Rename one of the files.")
         if name in project.mapping_files() and read != project.mapping(name):
             raise UsageError(
                 f"{path} is not the mapping {name!r} that the real board ran. Rename the file: the name says "

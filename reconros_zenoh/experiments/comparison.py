@@ -36,7 +36,6 @@ class MappingRun:
     An age is the time from the message or timer that a message follows from until it is over the link.
     """
 
-    seconds: float
     ages_ns: Mapping[str, list[int]]
     status: Mapping[str, Any]
 
@@ -44,12 +43,15 @@ class MappingRun:
         """Return the figures; `busiest` is what was busy for the largest share of the time."""
         callbacks, slots = self.status["callbacks"].values(), self.status["slots"]
         published = self.status["publishers"]
-        busy = {f"slot {slot['id']}": slot["busy_ms"] / self.seconds / 1e3 for slot in slots}
+        elapsed_ms = self.status["elapsed_ms"]
+        busy = {f"slot {slot['id']}": slot["busy_ms"] / elapsed_ms for slot in slots}
         shares = self.status["use"] | busy
         busiest = max(shares, key=lambda name: shares[name])
         return {
             "outputs": {
-                topic: _output(published[topic]["sent"] if topic in published else 0, self.seconds, ages_ns)
+                topic: _output(
+                    published[topic]["sent"] if topic in published else 0, elapsed_ms / 1e3, ages_ns
+                )
                 for topic, ages_ns in self.ages_ns.items()
             },
             "dropped": sum(callback["dropped"] for callback in callbacks),
@@ -99,9 +101,8 @@ def run_mapping(
 ) -> MappingRun:
     """Return what the project has made of the stimulus in so many seconds of virtual time.
 
-    `outputs` names the type of each topic that is listened to.
-
-    Raise UsageError when the board cannot host it. Ages are those of the last 10,000 messages of a topic.
+    `outputs` names the type of each topic that is listened to. Ages are those of its last 10,000 messages.
+    Raise UsageError when the board cannot host the project.
     """
     types = project.types()
     with Simulation(types) as simulation, closing(stimulus.schedule()) as schedule:
@@ -119,7 +120,7 @@ def run_mapping(
         for writer in hosted.board.writers:
             if writer.topic in ages_ns:
                 ages_ns[writer.topic] += writer.ages_ns
-        return MappingRun(seconds, ages_ns, status(hosted.board, hosted.executor))
+        return MappingRun(ages_ns, status(hosted.board, hosted.executor))
 
 
 def _output(sent: int, seconds: float, ages_ns: list[int]) -> dict[str, Any]:

@@ -22,7 +22,7 @@ from reconros_zenoh.project.target import target_profile
 from reconros_zenoh.text_file import read_text_file
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from reconros_zenoh.board.executor import Executor
     from reconros_zenoh.board.profile import Profile
@@ -104,6 +104,16 @@ class ProjectFiles:
             )
         check_places(self.configuration, mapping.callbacks)
         return mapping
+
+    def mappings(self, names_or_files: Sequence[str | None]) -> dict[str, Mapping]:
+        """Return these mappings by name, each as `mapping` does; raise UsageError for two of one name."""
+        mappings: dict[str, Mapping] = {}
+        for name_or_file in names_or_files:
+            mapping = self.mapping(name_or_file)
+            if mapping.name in mappings:
+                raise UsageError(f"two mappings are named {mapping.name!r}. Rename one of the files.")
+            mappings[mapping.name] = mapping
+        return mappings
 
     def unusable_mappings(self) -> dict[Path, FileError]:
         """Return those of the mapping files that the project refuses, each with why.

@@ -146,6 +146,7 @@ def test_where_nothing_leaves_the_board_nothing_is_drawn(tmp_path: Path) -> None
     shown = run(application_folder(), tmp_path, "--seconds", 0.1, "--mapping", "mixed")
     assert "nobody published on /angle, /image_classification, /image_raw: --input TOPIC" in shown
     assert "drawn" not in shown
+    assert "publishes" not in shown
     assert not (tmp_path / "compare.png").exists()
 
 
