@@ -70,11 +70,6 @@ class Timeline:
         self.started_ns = self._since_ns = self._environment.now
 
     @property
-    def total_ns(self) -> int:
-        """The time from the start to the last mark."""
-        return self._since_ns - self.started_ns
-
-    @property
     def age_ns(self) -> int:
         """The time to the last mark since what caused all of it: a message from elsewhere, or a timer."""
         return self._since_ns - self.began_ns

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from reconros_zenoh.ros.zero_message import zero_message
+
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
@@ -25,7 +27,5 @@ def image_fields(encoding: str, picture: NDArray[np.uint8]) -> dict[str, Any]:
 
 def image_message(types: TypeRegistry, encoding: str, picture: NDArray[np.uint8]) -> Any:
     """Return the message of a picture like those of `image_fields`, with a header of zeros."""
-    header = types.message("std_msgs/msg/Header").cls(
-        stamp=types.message("builtin_interfaces/msg/Time").cls(sec=0, nanosec=0), frame_id=""
-    )
+    header = zero_message(types.message("std_msgs/msg/Header"))
     return types.message("sensor_msgs/msg/Image").cls(header=header, **image_fields(encoding, picture))

@@ -89,7 +89,7 @@ def test_the_core_of_a_stopped_callback_is_free(caplog: pytest.LogCaptureFixture
     b.put_at(20_000)
     board.environment.run(until=10**7)
     assert executor.failures == {"a": 1}
-    assert b.timelines[0].total_ns == 100
+    assert b.timelines[0].age_ns == 100
 
 
 def test_the_limit_is_not_reached(caplog: pytest.LogCaptureFixture) -> None:

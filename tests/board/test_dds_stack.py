@@ -93,7 +93,7 @@ class Stack:
     def _alone(self, direction: str, size: int, transit_ns: int) -> dict[str, int]:
         timeline, end = self.begin("alone", direction, size, transit_ns)
         self.environment.run(until=end)
-        assert timeline.total_ns == self.environment.now - timeline.started_ns
+        assert timeline.age_ns == self.environment.now - timeline.started_ns
         return stages(timeline)
 
 
@@ -227,7 +227,7 @@ def test_a_sender_whose_clock_is_ahead_does_not_lengthen_the_link() -> None:
     timeline, end = stack.begin("message", "in", 8, transit_ns=-400)
     stack.environment.run(until=end)
     assert stack.log == [(516 + 124, "message")]
-    assert (stages(timeline), timeline.total_ns) == ({"transport": 516, "dds": 124}, 516 + 124)
+    assert (stages(timeline), timeline.age_ns) == ({"transport": 516, "dds": 124}, 516 + 124)
 
 
 def test_what_the_board_sends_leaves_earlier_by_what_messages_lately_took_in_the_real_network() -> None:

@@ -69,7 +69,7 @@ def test_a_callback_in_software(caplog: pytest.LogCaptureFixture) -> None:
     assert executor.failures == {"a": 1}
     # The worker was busy for as long as the callback takes; then it took the next message.
     assert source.answers == [(10, 0.1)]
-    assert [timeline.total_ns for timeline in source.timelines] == [100, 190]
+    assert [timeline.age_ns for timeline in source.timelines] == [100, 190]
 
 
 @pytest.mark.parametrize("when", ["before the computation", "in the kernel", "after it"])

@@ -243,7 +243,7 @@ class Late:
 
     def note(self) -> None:
         event = self.source.take()
-        assert event.timeline.total_ns == self.environment.now - event.timeline.started_ns
+        assert sum(event.timeline.stages_ns.values()) == self.environment.now - event.timeline.started_ns
         self.got.append((self.environment.now - self.started_ns, int(event.message.data[0])))
 
 

@@ -18,7 +18,7 @@ def test_a_mark_accounts_for_the_time_since_the_last_one() -> None:
     timeline.mark("dds")
     timeline.mark("queue")
     assert timeline.stages_ns == {"transport": 600, "dds": 250, "queue": 0}
-    assert timeline.total_ns == 850
+    assert timeline.age_ns == 850
 
 
 def test_a_stage_that_comes_twice_adds_up() -> None:
@@ -43,7 +43,7 @@ def test_the_stages_always_sum_to_the_time_since_the_start(
         environment.run(until=environment.now + pause_ns) if pause_ns else None
         timeline.mark(stage)  # type: ignore[arg-type] # one of three stages
         timeline = timeline.fork() if fork else timeline
-        assert timeline.total_ns == sum(timeline.stages_ns.values()) == environment.now - started_ns
+        assert timeline.age_ns == sum(timeline.stages_ns.values()) == environment.now - started_ns
 
 
 def test_a_fork_shares_the_past_and_nothing_after() -> None:

@@ -280,7 +280,7 @@ def test_a_slot_is_reconfigured_if_and_only_if_it_holds_another_bitstream(
     assert {slot.slot_id: slot.reconfigurations for slot in board.board.slots.values()} == changes
     for source in board.sources.values():
         for timeline in source.timelines:
-            assert sum(timeline.stages_ns.values()) == timeline.total_ns
+            assert sum(timeline.stages_ns.values()) == timeline.age_ns
 
 
 def test_a_timer_is_taken_before_a_subscriber_that_waits_longer() -> None:
