@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from typing import TYPE_CHECKING
 
+from reconros_zenoh.errors import BadMessageError
 from reconros_zenoh.ros.attachment import Attachment
 from reconros_zenoh.ros.graph import EndpointToken, gid
 from reconros_zenoh.ros.names import data_key, resolve
@@ -44,9 +45,24 @@ class Endpoint:
         self.gid = gid(self._token_key)
         self._sequence_numbers = itertools.count(1)
 
-    def announce(self, declaration: Declaration) -> None:
+    @property
+    def open_key(self) -> str:
+        """The key expression that leaves domain and type hash open."""
+        return "/".join(("*", *self.key.split("/")[1:-1], "*"))
+
+    def foreign(self, key: str) -> BadMessageError:
+        """Say what is wrong with a message on `key`, which matches the open key only."""
+        domain, own_domain = key.split("/", 1)[0], self.key.split("/", 1)[0]
+        if domain != own_domain:
+            return BadMessageError(
+                "foreign_domain", f"it was sent in domain {domain}, this is domain {own_domain}"
+            )
+        type_hash, own_hash = key.rsplit("/", 1)[1], self.key.rsplit("/", 1)[1]
+        return BadMessageError("type_mismatch", f"the sender's type has hash {type_hash}, ours {own_hash}")
+
+    def announce(self, *declarations: Declaration) -> None:
         """Make the endpoint visible in the graph, once it works; from then on its node closes it, too."""
-        self._declaration = declaration
+        self._declarations = declarations
         self._token = self.context.transport.declare_token(self._token_key)
         self._node.endpoints[self] = None
 
@@ -54,7 +70,8 @@ class Endpoint:
         """Take it out of the graph and end it for good; its callbacks are not called any more. Idempotent."""
         self._node.endpoints.pop(self, None)
         self._token.close()
-        self._declaration.close()
+        for declaration in self._declarations:
+            declaration.close()
 
     def next_sequence_number(self) -> int:
         """Return the number of the endpoint's next message; callable from any thread."""

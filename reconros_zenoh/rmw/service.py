@@ -9,6 +9,7 @@ from reconros_zenoh.rmw.endpoint import Endpoint
 from reconros_zenoh.rmw.received import Received
 from reconros_zenoh.ros.attachment import Attachment
 from reconros_zenoh.ros.graph import EndpointKind
+from reconros_zenoh.transport.key_expressions import intersects
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -39,7 +40,8 @@ class Service(Endpoint):
     """Hands the requests of one service to `sink`, decoded, on a thread of the transport.
 
     A bad request is counted and logged by the context, and its sender gets an error reply that says why.
-    `check` is as for a Subscription.
+    `check` is as for a Subscription. A request in another domain, or for another version of the type, is a
+    bad one, too, if nobody serves it and its sender asks not only complete servers, as ROS 2 clients do.
     """
 
     def __init__(
@@ -55,7 +57,11 @@ class Service(Endpoint):
         self.service_type = service_type
         self._sink = sink
         self._check = check
-        self.announce(self.context.transport.serve(self.key, self._on_request))
+        transport = self.context.transport
+        self.announce(
+            transport.serve(self.key, self._on_request),
+            transport.serve(self.open_key, self._on_foreign_request, complete=False),
+        )
 
     def _on_request(self, request: Request) -> None:
         sender = None
@@ -67,9 +73,16 @@ class Service(Endpoint):
             if self._check is not None:
                 self._check(message)
         except BadMessageError as error:
-            self.context.rejections.add(request.key, sender.hex() if sender else None, error)
-            request.reply_error(str(error))
+            self._refuse(request, sender, error)
             return
         transit_ns = self.context.clock_ns() - attachment.source_timestamp_ns
         response = _Response(self.context, request, attachment)
         self._sink(Received(message, len(payload), transit_ns, response, attachment.gid))
+
+    def _on_foreign_request(self, request: Request) -> None:
+        if not intersects(request.key, self.key):
+            self._refuse(request, None, self.foreign(request.key))
+
+    def _refuse(self, request: Request, sender: bytes | None, error: BadMessageError) -> None:
+        self.context.rejections.add(request.key, sender.hex() if sender else None, error)
+        request.reply_error(str(error))

@@ -41,16 +41,14 @@ class Subscription(Endpoint):
         self._type = message_type
         self._sink = sink
         self._check = check
-        middle = self.key.split("/")[1:-1]
-        expression = "/".join(("*", *middle, "*"))
-        self.announce(self.context.transport.subscribe(expression, self._on_sample, qos, self.key))
+        self.announce(self.context.transport.subscribe(self.open_key, self._on_sample, qos, self.key))
 
     def _on_sample(self, sample: Sample) -> None:
         key, attachment, payload = sample
         sender = None
         try:
             if key != self.key:
-                raise _foreign(key, self.key)
+                raise self.foreign(key)
             _, source_timestamp_ns, sender = Attachment.decode(attachment)
             message = self._type.decode(payload)
             if self._check is not None:
@@ -60,14 +58,3 @@ class Subscription(Endpoint):
             return
         transit_ns = self.context.clock_ns() - source_timestamp_ns
         self._sink(Received(message, len(payload), transit_ns, None, sender))
-
-
-def _foreign(key: str, own: str) -> BadMessageError:
-    domain, own_domain = key.split("/", 1)[0], own.split("/", 1)[0]
-    if domain != own_domain:
-        return BadMessageError(
-            "foreign_domain", f"it was sent in domain {domain}, this is domain {own_domain}"
-        )
-    return BadMessageError(
-        "type_mismatch", f"the sender's type has hash {key.rsplit('/', 1)[1]}, ours {own.rsplit('/', 1)[1]}"
-    )

@@ -125,8 +125,11 @@ class Transport(Protocol):
         wildcards in `key`, messages on `usual_key` still cost no more than without.
         """
 
-    def serve(self, key: str, sink: Callable[[Request], None]) -> Declaration:
-        """Hand every request on `key` to `sink` (a complete queryable)."""
+    def serve(self, key: str, sink: Callable[[Request], None], *, complete: bool = True) -> Declaration:
+        """Hand every request on `key` to `sink` (a queryable).
+
+        One that is not complete is for requests that no complete one takes. A `Querier` sends it none.
+        """
 
     def request(self, key: str, on_matching: OnMatching | None = None) -> Querier:
         """Declare a querier on a key without wildcards: target ALL_COMPLETE, no consolidation.

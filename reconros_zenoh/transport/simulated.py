@@ -75,9 +75,11 @@ class SimulatedTransport(Closing):
                     subscription.post(sink, sample)
         return subscription
 
-    def serve(self, key: str, sink: Callable[[Request], None]) -> _Receiver:
+    def serve(self, key: str, sink: Callable[[Request], None], *, complete: bool = True) -> _Receiver:
         """Declare a server, see `Transport.serve`."""
-        return _Receiver(self._enter(key), key, self._network.services, sink)
+        # Whoever asks here asks complete servers only.
+        ends: _Ends[_Querier] = self._network.services if complete else _Ends()
+        return _Receiver(self._enter(key), key, ends, sink)
 
     def request(self, key: str, on_matching: OnMatching | None = None) -> _Querier:
         """Declare a querier, see `Transport.request`."""

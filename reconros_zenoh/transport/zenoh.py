@@ -141,7 +141,7 @@ class ZenohTransport(Closing):
             declaration.add(self.session.declare_subscriber, key, handler)
         return declaration
 
-    def serve(self, key: str, sink: Callable[[Request], None]) -> _Declaration:
+    def serve(self, key: str, sink: Callable[[Request], None], *, complete: bool = True) -> _Declaration:
         """Declare a server, see `Transport.serve`."""
         declaration = _Declaration(self, key)
         is_pattern = "*" in key
@@ -150,7 +150,7 @@ class ZenohTransport(Closing):
             declaration.call(sink, _Request(str(query.key_expr) if is_pattern else key, query, self))
 
         handler = direct(on_query)
-        declaration.add(self.session.declare_queryable, key, handler, complete=True)
+        declaration.add(self.session.declare_queryable, key, handler, complete=complete)
         return declaration
 
     def request(self, key: str, on_matching: OnMatching | None = None) -> _Querier:

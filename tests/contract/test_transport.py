@@ -460,6 +460,21 @@ def test_a_request_without_a_server_is_over(network: Network) -> None:
     network.wait(ends.has(None))
 
 
+def test_a_querier_neither_hears_of_a_server_that_is_not_complete_nor_asks_it(network: Network) -> None:
+    here, there = network.session(), network.session()
+    matching, requests, ends = network.inbox(), network.inbox(), network.inbox()
+    there.serve("*/sorter", requests.put, complete=False)
+    there.serve("0/sorter", lambda request: request.reply([b"sorted"], None))
+    know(network, here, there)
+    here.request("1/sorter", matching.put).get([b""], None, ends.put, LIMIT_NS)
+    network.wait(ends.has(None))
+    here.request("0/sorter").get([b""], None, ends.put, LIMIT_NS)
+    network.wait(lambda: len(ends.items) == len([None, "sorted", None]))
+    assert ends.items[1].payload == b"sorted"
+    assert matching.items == [False]
+    assert requests.items == []
+
+
 def test_a_request_that_no_server_keeps_is_over_before_its_time(network: Network) -> None:
     here, there = network.session(), network.session()
     requests, ends = network.inbox(), network.inbox()

@@ -201,6 +201,27 @@ def ask(network: Network, types: TypeRegistry, payload: bytes, with_attachment: 
     return reply
 
 
+@pytest.mark.parametrize(
+    ("place", "other", "reason"), [(0, "1", "foreign_domain"), (-1, "RIHS01_0", "type_mismatch")]
+)
+def test_a_request_of_another_domain_or_type_is_answered_with_the_reason(
+    network: Network, types: TypeRegistry, place: int, other: str, reason: str
+) -> None:
+    refusals = Refusals(network)
+    service = types.service(SORT)
+    chunks = data_key(0, "/sorter", service.dds_name, service.type_hash).split("/")
+    chunks[place] = other
+    key = "/".join(chunks)
+    for _ in range(2):
+        (reply,) = network.transport.session.get(
+            key, payload=numbers(types, 2048), attachment=attachment(new_sender()), timeout=LIMIT_S
+        )
+        assert reply.err is not None
+        assert reply.err.payload.to_string().startswith(f"{reason}: ")
+    refusals.wait_for(**{reason: 2})
+    assert_logged_once(network, types, reason, f" {key} from an unknown sender")
+
+
 REQUESTS: dict[str, tuple[Callable[[TypeRegistry], bytes], str, str]] = {
     "one number too few": (lambda types: numbers(types, 2047), "number_count", "2047 numbers"),
     "a million numbers": (lambda types: numbers(types, 10**6), "number_count", "1000000 numbers"),
