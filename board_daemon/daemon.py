@@ -9,6 +9,7 @@ from reconros_zenoh.board.control import ControlServer, claim_name, status
 from reconros_zenoh.board.gateway_control import GatewayServer
 from reconros_zenoh.clock.process import begin_process
 from reconros_zenoh.clock.virtual import succeed_once
+from reconros_zenoh.measure.trace_file import traced_to
 from reconros_zenoh.transport.zenoh import ZenohTransport
 
 if TYPE_CHECKING:
@@ -32,7 +33,7 @@ def run_board(
     """Return the board's last status after SIGINT, SIGTERM or that many seconds, with everything closed.
 
     `on_ready` is called once the board serves. Raise TransportError without a router, UsageError when the
-    name is taken.
+    name is taken or the trace cannot be written.
     """
     environment, stop = begin_process()
     with ZenohTransport.open(router) as transport:
@@ -41,10 +42,11 @@ def run_board(
         control = ControlServer(hosted.board, hosted.executor)
         gateways = GatewayServer(hosted.board, project.types())
         try:
-            on_ready()
-            if seconds is not None:
-                environment.call_later(round(seconds * 1e9), succeed_once, stop)
-            environment.run(until=stop)
+            with traced_to(options.trace, hosted.board):
+                on_ready()
+                if seconds is not None:
+                    environment.call_later(round(seconds * 1e9), succeed_once, stop)
+                environment.run(until=stop)
             return status(hosted.board, hosted.executor)
         finally:
             gateways.close()

@@ -28,13 +28,17 @@ _NAME = re.compile(r"[A-Za-z0-9_.-]+")  # one part of a key
 
 @dataclass(frozen=True, slots=True)
 class BoardOptions:
-    """What distinguishes one hosted board from another; UsageError for a name that cannot stand in a key."""
+    """What distinguishes one hosted board from another; UsageError for a name that cannot stand in a key.
+
+    `trace` is the file for what the board did, which who runs the board writes.
+    """
 
     name: str = "board0"
     domain: int = 0
     seed: int = 0
     bitstreams: Path | None = None
     tap: bool = False
+    trace: Path | None = None
 
     def __post_init__(self) -> None:
         if not _NAME.fullmatch(self.name):
@@ -54,6 +58,8 @@ class HostedBoard:
         project: Project,
         mapping: Mapping,
         options: BoardOptions,
+        *,
+        traced: bool = False,
     ) -> None:
         threads = None
         context = Context(transport, options.domain, environment.clock_ns)
@@ -70,6 +76,7 @@ class HostedBoard:
             threads=threads,
             pointer_bytes=project.pointer_bytes,
             tap=options.tap,
+            traced=traced or options.trace is not None,
         )
         self._application = Application(project, self.board, mapping, project.types(), options.bitstreams)
         self.executor: Executor = project.start(self._application)

@@ -18,6 +18,7 @@ from reconros_zenoh.board.profile import Profile, read_profile
 from reconros_zenoh.board.sources import ServiceSource, SubscriptionSource, TimerSource
 from reconros_zenoh.clock.virtual import VirtualEnvironment, succeed_once
 from reconros_zenoh.errors import UsageError
+from reconros_zenoh.measure.trace_plots import trace_figure
 from reconros_zenoh.project.loader import load_project
 from reconros_zenoh.rmw.node import Context
 from reconros_zenoh.ros.graph import EndpointKind, EndpointToken, parse, tokens_expression
@@ -28,6 +29,7 @@ from reconros_zenoh.transport.simulated import SimulatedNetwork
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
+    from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
     from reconros_zenoh.board.writers import TopicWriter
@@ -43,6 +45,9 @@ class VirtualDesktop:
     `types` knows the message types, `desktop` is a node that publishes to the board and hears from it. Not
     thread-safe; nothing happens but in `run` and `round_trips`.
     """
+
+    board: Board
+    executor: Executor
 
     def __init__(self, types: TypeRegistry) -> None:
         self.types = types
@@ -101,6 +106,15 @@ class VirtualDesktop:
         publisher.close()
         return np.array(times_ms)
 
+    def status(self) -> dict[str, Any]:
+        """Return what the board has done so far, as `reconros status` shows it."""
+        return status(self.board, self.executor)
+
+    def trace_figure(self) -> Figure:
+        """Return a drawing of what ran where in the last second; see `measure.trace_plots`."""
+        assert self.board.trace is not None
+        return trace_figure(self.board.name, self.board.trace)
+
     def _check_ends(self, kind: EndpointKind, topic: str, type_name: str) -> None:
         """Raise UsageError unless there is such an end of the topic, with this type."""
         context = self.desktop.context
@@ -154,6 +168,7 @@ class VirtualBoard(VirtualDesktop):
             read_profile(profile) if isinstance(profile, str) else profile,
             tuple(SlotPlan(slot, _SLOT.lut, _SLOT.dsp, _SLOT.bram36) for slot in range(slots)),
             seed=seed,
+            traced=True,
         )
         self.executor = Executor(
             self.board, software_workers, slots if hardware_workers is None else hardware_workers
@@ -188,10 +203,6 @@ class VirtualBoard(VirtualDesktop):
         """Return an action client of the board."""
         return ActionClientSource(self.board, self._node, self.types.action(type_name), name)
 
-    def status(self) -> dict[str, Any]:
-        """Return what the board has done so far, as `reconros status` shows it."""
-        return status(self.board, self.executor)
-
 
 class VirtualProject(VirtualDesktop):
     """A ReconROS project on an emulated board; its callbacks are served as soon as time passes.
@@ -216,10 +227,7 @@ class VirtualProject(VirtualDesktop):
             project,
             project.mapping(mapping),
             BoardOptions(seed=seed),
+            traced=True,
         )
         self.board = self._hosted.board
         self.executor = self._hosted.executor
-
-    def status(self) -> dict[str, Any]:
-        """Return what the board has done so far, as `reconros status` shows it."""
-        return status(self.board, self.executor)

@@ -17,6 +17,7 @@ from reconros_zenoh.board.memif import Memif
 from reconros_zenoh.board.osif import Osif
 from reconros_zenoh.board.slots import Slot
 from reconros_zenoh.board.spans import Spans
+from reconros_zenoh.board.trace import Trace
 from reconros_zenoh.board.writers import TopicWriter
 from reconros_zenoh.board.zycap import ZyCAP
 from reconros_zenoh.errors import UsageError
@@ -71,10 +72,12 @@ class Board:
         threads: int | None = None,
         pointer_bytes: int = 4,
         tap: bool = False,
+        traced: bool = False,
     ) -> None:
         """In wall time `threads` run the computations, and as many send; None: all in line, in virtual time.
 
-        `tap` lets what passes its hardware-mapped topics out into the network, for debugging.
+        `tap` lets what passes its hardware-mapped topics out into the network, for debugging; `traced` keeps
+        a `trace` of what its parts do.
         """
         model = profile.model
         self.environment = environment
@@ -82,13 +85,16 @@ class Board:
         self.context = context
         self.profile = profile
         self.name = name
+        self.trace = Trace(environment) if traced else None
         self.cpu = Cpu(environment, int(model.cores.count.value) if model else 1)
         self.memif = Memif(environment, model.memif.bandwidth.bytes_per_ns if model else None)
         self.memory = AddressSpace(pointer_bytes)
         self.osif = Osif(self.cpu, model.osif.call.ns if model else 0)
         self.zycap = ZyCAP(environment, self.cpu, model.icap if model else None, model.dds if model else None)
         self.randomness = random.Random(f"{seed} {name}")
-        self.dds = DdsStack(environment, self.cpu, model, self.randomness)
+        self.dds = DdsStack(
+            environment, self.cpu, model, self.randomness, self.trace.stack if self.trace else None
+        )
         # Without a model no event has a time that it could miss.
         self.host = Host(environment, threads, modelled=model is not None)
         # In threads of its own: a message does not wait until a worker's computation has ended.
@@ -106,6 +112,7 @@ class Board:
                 profile.bitstream_size(plan.lut, plan.dsp, plan.bram36),
                 plan.clock_hz or (model.fabric.thread_clock.hz if model else _ANY_CLOCK_HZ),
                 reconfigurable=plan.reconfigurable,
+                icap=self.trace.icap if self.trace else None,
             )
             for plan in slots
         }

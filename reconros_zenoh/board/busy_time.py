@@ -5,28 +5,37 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from reconros_zenoh.board.trace import Track
     from reconros_zenoh.clock.virtual import VirtualEnvironment
 
 
 class BusyTime:
-    """The time between each `begin` and the `end` that follows it, and since a `begin` without one."""
+    """The time between each `begin` and the `end` that follows it, and since a `begin` without one.
 
-    __slots__ = ("_environment", "_since_ns", "_total_ns")
+    With a `track` a trace shows it.
+    """
 
-    def __init__(self, environment: VirtualEnvironment) -> None:
+    __slots__ = ("_environment", "_since_ns", "_total_ns", "_track")
+
+    def __init__(self, environment: VirtualEnvironment, track: Track | None = None) -> None:
         self._environment = environment
+        self._track = track
         self._total_ns = 0
         self._since_ns: int | None = None
 
-    def begin(self) -> None:
+    def begin(self, what: str = "") -> None:
         """Be busy from now on."""
         self._since_ns = self._environment.now
+        if self._track is not None:
+            self._track.begin(what)
 
     def end(self) -> None:
         """Be busy no longer."""
         assert self._since_ns is not None
         self._total_ns += self._environment.now - self._since_ns
         self._since_ns = None
+        if self._track is not None:
+            self._track.end()
 
     @property
     def ns(self) -> int:

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from reconros_zenoh.board.cpu import Cpu
     from reconros_zenoh.board.profile import Model
     from reconros_zenoh.board.spans import Timeline
+    from reconros_zenoh.board.trace import Track
     from reconros_zenoh.clock.activity import Awaitable
     from reconros_zenoh.clock.virtual import VirtualEnvironment
 
@@ -22,8 +23,9 @@ _TRANSITS_REMEMBERED = 8
 
 
 class _Passage(NamedTuple):
-    """A message's turn in the stack: how long it takes when cores are free, and who waits for its end."""
+    """A message's turn in the stack: which way, how long with free cores, and who waits for its end."""
 
+    way: str
     duration_ns: float
     done: Signal
 
@@ -47,13 +49,18 @@ class DdsStack:
     """
 
     def __init__(
-        self, environment: VirtualEnvironment, cpu: Cpu, model: Model | None, randomness: random.Random
+        self,
+        environment: VirtualEnvironment,
+        cpu: Cpu,
+        model: Model | None,
+        randomness: random.Random,
+        track: Track | None = None,
     ) -> None:
         self._environment = environment
         self._cpu = cpu
         self._randomness = randomness
         self._modelled = model is not None
-        self.busy = BusyTime(environment)
+        self.busy = BusyTime(environment, track)
         # How long small and large messages lately were on their way in the real network; nothing in virtual
         # time.
         self._transit_ns = {False: 0.0, True: 0.0}
@@ -93,7 +100,7 @@ class DdsStack:
         yield from self._until(timeline.started_ns + self._link_ns(size))
         timeline.mark("transport")
         probability = self._loss_probability_busy if self._cpu.is_busy else self._loss_probability
-        yield from self._process(size, self._receive_ns_per_byte)
+        yield from self._process("in", size, self._receive_ns_per_byte)
         timeline.mark("dds")
         return not large or (yield from self._repair(size, timeline, probability, reliable=reliable))
 
@@ -102,7 +109,7 @@ class DdsStack:
         if not self._modelled:
             timeline.mark("dds")
             return
-        yield from self._process(size, self._send_ns_per_byte)
+        yield from self._process("out", size, self._send_ns_per_byte)
         timeline.mark("dds")
         arrives_ns = self._environment.now + self._link_ns(size)
         yield from self._until(arrives_ns - round(self._transit_ns[size > self._large_from]))
@@ -115,18 +122,18 @@ class DdsStack:
         if time_ns > self._environment.now:
             yield self._environment.timeout(time_ns - self._environment.now)
 
-    def _process(self, size: int, ns_per_byte_large: float) -> Generator[Awaitable, object, None]:
+    def _process(self, way: str, size: int, ns_per_byte_large: float) -> Generator[Awaitable, object, None]:
         """Return when the stack has worked on a message of `size` bytes."""
         ns_per_byte = ns_per_byte_large if size > self._large_from else self._ns_per_byte
         duration_ns = self._message_ns + size * ns_per_byte
         if self._jitter:
             duration_ns *= self._randomness.lognormvariate(0, self._jitter)
-        passage = _Passage(duration_ns, Signal())
+        passage = _Passage(way, duration_ns, Signal())
         self._passages.put(passage)
         yield passage.done
 
     def _pass(self, passage: _Passage) -> Generator[Awaitable, object, None]:
-        self.busy.begin()
+        self.busy.begin(passage.way)
         yield from self._cpu.run_stack(passage.duration_ns * self._core_share, self._core_share)
         self.busy.end()
         passage.done.fire()
@@ -143,6 +150,6 @@ class DdsStack:
             timeline.mark("retransmission")
         while self._randomness.random() < self._nack_probability:
             yield self._environment.timeout(self._nack_delay_ns)
-            yield from self._process(size, self._receive_ns_per_byte)
+            yield from self._process("in", size, self._receive_ns_per_byte)
             timeline.mark("retransmission")
         return True

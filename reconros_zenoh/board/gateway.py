@@ -54,6 +54,7 @@ class Gateway:
             board, node, topic.type, smt, qos, own=PublisherFilter(self._writer.gid)
         )
         self._hmt = Fifo(FifoPlan(), self._wake, PublisherFilter(self), cut_through=True)
+        self._track = board.trace.worker(f"RS{slot.slot_id}") if board.trace else None
         self.name = node.name
         self._label = node.fully_qualified_name
         self.pair = Pair(topic.key, self._writer.topic)
@@ -85,7 +86,13 @@ class Gateway:
         yield from self._board.zycap.write_bitstream(slot, bitstream)
         state, action = core.step(core.State(), core.Started())
         while True:
+            # While its request stands the core waits for messages.
+            track = None if isinstance(action, core.Request) else self._track
+            if track:
+                track.begin(self.name)
             event = yield from self._carry_out(action)
+            if track:
+                track.end()
             state, action = core.step(state, event)
 
     def _carry_out(self, action: core.Action) -> Generator[Awaitable, object, core.Event]:

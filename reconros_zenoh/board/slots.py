@@ -9,6 +9,7 @@ from reconros_zenoh.board.busy_time import BusyTime
 from reconros_zenoh.errors import UsageError
 
 if TYPE_CHECKING:
+    from reconros_zenoh.board.trace import Track
     from reconros_zenoh.clock.virtual import VirtualEnvironment
 
 
@@ -29,6 +30,7 @@ class Slot:
         clock_hz: float,
         *,
         reconfigurable: bool,
+        icap: Track | None = None,
     ) -> None:
         self.slot_id = slot_id
         self.bitstream_size = bitstream_size
@@ -39,7 +41,7 @@ class Slot:
         self.is_given_away = False
         self.reconfigurations = 0
         self.busy = BusyTime(environment)
-        self.reconfiguring = BusyTime(environment)
+        self.reconfiguring = BusyTime(environment, icap)
         self.waiting = BusyTime(environment)
 
     def admit(self, name: str, *, alone: bool = False) -> Bitstream:

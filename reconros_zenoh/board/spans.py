@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Literal
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from reconros_zenoh.board.trace import Track
     from reconros_zenoh.clock.virtual import VirtualEnvironment
 
 Stage = Literal[
@@ -32,21 +33,33 @@ class Timeline:
 
     Where that goes to a reader on the same board, the reader's timeline follows; `began_ns` is when the first
     of them started. `callback` is the callback or gateway that serves the message, empty until it took it;
-    `waits_for` is what that waits for now until others provide it. A message that came from a clock that is
-    ahead, or that was set back since, starts now.
+    `waits_for` is what that waits for now until others provide it; `track` is where a trace shows it. A
+    message that came from a clock that is ahead, or that was set back since, starts now.
     """
 
-    __slots__ = ("_environment", "_since_ns", "began_ns", "callback", "stages_ns", "started_ns", "waits_for")
+    __slots__ = (
+        "_environment",
+        "_since_ns",
+        "began_ns",
+        "callback",
+        "stages_ns",
+        "started_ns",
+        "track",
+        "waits_for",
+    )
 
     def __init__(self, environment: VirtualEnvironment, started_ns: int) -> None:
         self._environment = environment
         self.started_ns = self.began_ns = self._since_ns = min(started_ns, environment.now)
         self.callback = self.waits_for = ""
+        self.track: Track | None = None
         self.stages_ns: defaultdict[Stage, int] = defaultdict(int)
 
     def mark(self, stage: Stage) -> None:
         """Account the time since the last mark to `stage`."""
         now = self._environment.now
+        if self.track is not None:
+            self.track.stage(stage, self._since_ns)
         self.stages_ns[stage] += now - self._since_ns
         self._since_ns = now
 

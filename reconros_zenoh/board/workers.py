@@ -37,14 +37,18 @@ class Worker(ABC):
     event whose callback it runs, since `since_ns`, or None.
     """
 
-    def __init__(self, executor: Executor, resource: int, poll_ns: int) -> None:
+    def __init__(self, executor: Executor, name: str, resource: int, poll_ns: int) -> None:
         self._executor = executor
         self._board = executor.board
+        trace = executor.board.trace
+        self._track = trace.worker(name) if trace else None
         self._environment = executor.board.environment
         self.resource = resource
         self._poll_ns = poll_ns
         self.serves: Timeline | None = None
         self.since_ns = 0
+        # Traced or not is known from the start: who is not traced pays nothing for it.
+        self._call = self._traced if self._track else self._execute
         self._activity = Activity(self._run())
 
     def wake(self) -> None:
@@ -60,7 +64,7 @@ class Worker(ABC):
             self.serves, self.since_ns = event.timeline, self._environment.now
             event.timeline.callback = dispatch.entry.name
             try:
-                response = yield from self._execute(dispatch, event)
+                response = yield from self._call(dispatch, event)
                 self._executor.complete(dispatch, event, response)
             except (Exception, SystemExit) as error:  # noqa: BLE001 - a callback may raise or return anything
                 self._executor.fail(dispatch, event, error)
@@ -87,6 +91,18 @@ class Worker(ABC):
         self._environment.call_later(limit.ns, deadline.fire)
         return limited(steps, deadline, limit.error)
 
+    def _traced(self, dispatch: Dispatch, event: Event) -> Generator[Awaitable, object, object]:
+        """Run the callback to completion, on the track of this worker."""
+        track = self._track
+        assert track is not None
+        event.timeline.track = track
+        track.begin(dispatch.entry.name)
+        try:
+            return (yield from self._execute(dispatch, event))
+        finally:
+            track.end()
+            event.timeline.track = None
+
     @abstractmethod
     def _execute(self, dispatch: Dispatch, event: Event) -> Generator[Awaitable, object, object]:
         """Run the callback to completion and return what it returned."""
@@ -95,8 +111,8 @@ class Worker(ABC):
 class SoftwareWorker(Worker):
     """Runs callbacks as functions on a core."""
 
-    def __init__(self, executor: Executor, poll_ns: int) -> None:
-        super().__init__(executor, SOFTWARE, poll_ns)
+    def __init__(self, executor: Executor, number: int, poll_ns: int) -> None:
+        super().__init__(executor, f"software {number}", SOFTWARE, poll_ns)
 
     def _execute(self, dispatch: Dispatch, event: Event) -> Generator[Awaitable, object, object]:
         board, timeline = self._board, event.timeline
@@ -143,7 +159,7 @@ class HardwareWorker(Worker):
     """Runs callbacks in one slot."""
 
     def __init__(self, executor: Executor, slot: Slot, poll_ns: int) -> None:
-        super().__init__(executor, slot.slot_id, poll_ns)
+        super().__init__(executor, f"RS{slot.slot_id}", slot.slot_id, poll_ns)
         self._slot = slot
 
     def _execute(self, dispatch: Dispatch, event: Event) -> Generator[Awaitable, object, object]:

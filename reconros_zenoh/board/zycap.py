@@ -66,7 +66,7 @@ class ZyCAP:
         with self._port.request() as granted:
             yield granted
             slot.waiting.end()
-            slot.reconfiguring.begin()
+            slot.reconfiguring.begin(bitstream.callback)
             slot.holds = None
             duration_ns = self.reconfiguration_ns(bitstream.size)
             if duration_ns:

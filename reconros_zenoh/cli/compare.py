@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.text import Text
 
+from board_daemon.hosting import BoardOptions
 from reconros_zenoh.cli.console import interrupted, titled_table, wide_console
 from reconros_zenoh.cli.options import AsJson, ModelSeed, ProjectProfile, project_prints
 from reconros_zenoh.cli.progress import run_bar
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
 _DRAWING = "compare.png"
+_TRACE = "trace.png"
 _SECONDS = 10.0
 
 
@@ -100,7 +102,8 @@ def compare(
             for name, mapped in mappings.items():
                 # Anew: what main.py and its modules remember belongs to one run.
                 again = replace(loaded, main=load_main(project, loaded.configuration.name))
-                runs[name] = run_mapping(model, again, mapped, stimulus, outputs, seconds, seed)
+                options = BoardOptions(seed=seed, trace=out / name / _TRACE)
+                runs[name] = run_mapping(model, again, mapped, stimulus, outputs, seconds, options)
                 advance()
         experiment = {
             "experiment": "compare",
@@ -125,6 +128,7 @@ def compare(
     elif runs:
         _print(wide_console(), experiment)
         print(f"records and experiment.json are in {out}" + (f"; drawn to {out / _DRAWING}" if drawn else ""))
+        print(f"what each board did when in its last second: {out}/<mapping>/{_TRACE}")
     if interruption.happened:
         raise interrupted(quiet=as_json, measured=bool(runs))
 

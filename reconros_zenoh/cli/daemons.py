@@ -25,6 +25,7 @@ from reconros_zenoh.cli.options import (
     ModelSeed,
     ProjectProfile,
     Router,
+    TraceFile,
 )
 from reconros_zenoh.cli.status_screen import print_status
 from reconros_zenoh.experiments.roundtrip import application_folder
@@ -82,6 +83,7 @@ def board(
     tap: Annotated[
         bool, typer.Option("--tap", help="Let hardware-mapped topics out, as hmt/<board>/<topic>.")
     ] = False,
+    trace: TraceFile = None,
 ) -> None:
     """Run an emulated board that hosts a project, until Ctrl-C."""
     from board_daemon.daemon import run_board
@@ -95,7 +97,7 @@ def board(
         model,
         loaded,
         mapped,
-        BoardOptions(name, domain, seed, bitstreams, tap),
+        BoardOptions(name, domain, seed, bitstreams, tap, trace),
         lambda: print(
             f"board {name} serves {loaded.configuration.name} under {mapped.name} on {model.name}", flush=True
         ),

@@ -60,6 +60,15 @@ Bitstreams = Annotated[
     Path | None,
     typer.Option(help="Folder of `reconros build`.", show_default="bitstreams held in memory"),
 ]
+TraceFile = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="FILE",
+        envvar="RECONROS_TRACE",
+        help="Write what ran where and when: .json for Perfetto, or drawn, .png or .svg.",
+        show_default=False,
+    ),
+]
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
 
 

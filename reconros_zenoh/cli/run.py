@@ -23,6 +23,7 @@ from reconros_zenoh.cli.options import (
     ModelSeed,
     ProjectProfile,
     Router,
+    TraceFile,
     project_prints,
 )
 from reconros_zenoh.cli.status_screen import print_status
@@ -54,6 +55,7 @@ def run(
     domain: Domain = 0,
     seed: ModelSeed = 0,
     bitstreams: Bitstreams = None,
+    trace: TraceFile = None,
     as_json: AsJson = False,
 ) -> None:
     """Run a project on an emulated board of its TargetBoard.
@@ -64,7 +66,7 @@ def run(
         loaded = load_project(project)
         model = loaded.profile(profile)
         mapped = loaded.mapping(mapping)
-        options = BoardOptions(name, domain, seed, bitstreams)
+        options = BoardOptions(name, domain, seed, bitstreams, trace=trace)
         if clock is ClockName.VIRTUAL:
             seconds = seconds or _VIRTUAL_S
             done = _run_virtual(model, loaded, mapped, options, seconds)
@@ -89,6 +91,8 @@ def run(
             print(
                 f"{model.name} models nothing, so nothing took any time. --profile chooses a board that does."
             )
+        if trace:
+            print(f"what ran where and when is in {trace}")
     if early:
         raise interrupted(quiet=as_json)
 

@@ -116,7 +116,9 @@ def _board_plan(given: Mapping[str, Any], command: Node, projects: Callable[[Pat
             f"runs on {profile.name}, which models nothing: nothing would take any virtual time.",
             "Give another --profile.",
         )
-    options = BoardOptions(given["name"], given["domain"], given["seed"], given["bitstreams"])
+    options = BoardOptions(
+        given["name"], given["domain"], given["seed"], given["bitstreams"], trace=given["trace"]
+    )
     return BoardPlan(profile, project, mapping, options)
 
 

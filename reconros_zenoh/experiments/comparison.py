@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from board_daemon.hosting import BoardOptions
 from reconros_zenoh.board.control import status
 from reconros_zenoh.experiments.simulation import Simulation
 from reconros_zenoh.experiments.stimulus import feed
@@ -20,6 +19,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
     from pathlib import Path
 
+    from board_daemon.hosting import BoardOptions
     from reconros_zenoh.board.profile import Profile
     from reconros_zenoh.experiments.stimulus import Stimulus
     from reconros_zenoh.project.build_cfg import BuildConfiguration
@@ -97,7 +97,7 @@ def run_mapping(
     stimulus: Stimulus,
     outputs: Mapping[str, str],
     seconds: float,
-    seed: int,
+    options: BoardOptions,
 ) -> MappingRun:
     """Return what the project has made of the stimulus in so many seconds of virtual time.
 
@@ -106,7 +106,7 @@ def run_mapping(
     """
     types = project.types()
     with Simulation(types) as simulation, closing(stimulus.schedule()) as schedule:
-        hosted = simulation.add_board(profile, project, mapping, BoardOptions(seed=seed))
+        hosted = simulation.add_board(profile, project, mapping, options)
         desktop = simulation.context().node("desktop")
         for topic, name in outputs.items():
             desktop.subscription(types.message(name), topic, lambda _: None)

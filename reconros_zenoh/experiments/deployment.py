@@ -75,15 +75,17 @@ class DeploymentPlan:
         return DeploymentPlan(boards, clients, cameras, self.viewers, robots)
 
     def clone(self, number: int) -> DeploymentPlan:
-        """Return the same with `-number` behind the names of the boards.
+        """Return the same with `-number` behind the names of the boards and of their traces.
 
         What is random on a board follows from its seed and its name, so it differs from clone to clone; the
         clients send the same inputs in the same order.
         """
-        boards = {
-            service: replace(board, options=replace(board.options, name=f"{board.options.name}-{number}"))
-            for service, board in self.boards.items()
-        }
+        boards = {}
+        for service, board in self.boards.items():
+            name, trace = f"{board.options.name}-{number}", board.options.trace
+            if trace is not None:
+                trace = trace.with_stem(f"{trace.stem}-{number}")
+            boards[service] = replace(board, options=replace(board.options, name=name, trace=trace))
         return replace(self, boards=boards)
 
     def place(self, domain: int) -> str:

@@ -19,6 +19,7 @@ from host_clients.viewer import Viewer
 from reconros_zenoh.clock.process import tune_memory
 from reconros_zenoh.clock.virtual import VirtualEnvironment
 from reconros_zenoh.errors import TransportError
+from reconros_zenoh.measure.trace_file import traced_to
 from reconros_zenoh.rmw.node import Context
 from reconros_zenoh.transport.simulated import SimulatedNetwork
 
@@ -77,10 +78,14 @@ class Simulation:
     def add_board(
         self, profile: Profile, project: Project, mapping: Mapping, options: BoardOptions
     ) -> HostedBoard:
-        """Return a board that serves from the beginning; raise UsageError when it cannot host the project."""
+        """Return a board that serves from the beginning, and whose trace is written at the end.
+
+        Raise UsageError when it cannot host the project, or the trace cannot be written.
+        """
         transport = self._network.transport(f"{next(self._sessions):x}")
         board = HostedBoard(self.environment, transport, profile, project, mapping, options)
         self._closing.callback(board.close)
+        self._closing.enter_context(traced_to(options.trace, board.board))
         return board
 
     def add_client(self, options: ClientOptions, on_round_trip: Callable[[RoundTrip], None]) -> None:

@@ -9,7 +9,6 @@ from reconros_zenoh.rmw.endpoint import Endpoint
 from reconros_zenoh.rmw.received import Received
 from reconros_zenoh.ros.attachment import Attachment
 from reconros_zenoh.ros.graph import EndpointKind
-from reconros_zenoh.transport.key_expressions import intersects
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -80,7 +79,7 @@ class Service(Endpoint):
         self._sink(Received(message, len(payload), transit_ns, response, attachment.gid))
 
     def _on_foreign_request(self, request: Request) -> None:
-        if not intersects(request.key, self.key):
+        if request.key != self.key and "*" not in request.key:  # else the other queryable has it, too
             self._refuse(request, None, self.foreign(request.key))
 
     def _refuse(self, request: Request, sender: bytes | None, error: BadMessageError) -> None:

@@ -139,6 +139,7 @@ def small_board(
     network: SimulatedNetwork | None = None,
     name: str = "board0",
     static: Container[int] = (),
+    traced: bool = False,
 ) -> Board:
     """A board in a network of its own, or in this one; the `static` slots are not reconfigurable."""
     if network is None:
@@ -148,7 +149,14 @@ def small_board(
     context = Context(network.transport(session), 0, environment.clock_ns)
     plans = tuple(SlotPlan(slot, 100, 0, 0, None, slot not in static) for slot in range(slots))
     return Board(
-        environment, context, profile, plans, threads=threads, name=name, pointer_bytes=pointer_bytes
+        environment,
+        context,
+        profile,
+        plans,
+        threads=threads,
+        name=name,
+        pointer_bytes=pointer_bytes,
+        traced=traced,
     )
 
 

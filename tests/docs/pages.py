@@ -38,10 +38,11 @@ def blocks(path: Path) -> Iterator[Block]:
 
 
 def invoke(command: str, *more: str) -> list[str]:
-    """Return the lines that the command prints; raise what it raises."""
-    program, *arguments = shlex.split(command, comments=True)
-    assert program == "reconros", command
-    result = CliRunner().invoke(_APPLICATION, [*arguments, *more])
+    """Return the lines that the command prints; raise what it raises. Variables may stand before it."""
+    words = shlex.split(command, comments=True)
+    program = words.index("reconros")
+    environment = dict(word.split("=", 1) for word in words[:program])
+    result = CliRunner(env=environment).invoke(_APPLICATION, [*words[program + 1 :], *more])
     if result.exception and not isinstance(result.exception, SystemExit):
         raise result.exception
     assert result.exit_code == 0, f"{command}: {result.output}"

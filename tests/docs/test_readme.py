@@ -28,7 +28,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
-LEFT_OUT = re.compile(r"reconros (up|down)\b|.*--clock wall|reconros experiment gateway --profile native")
+COMMAND = re.compile(r"(\w+=\S+ )*reconros ")
+LEFT_OUT = re.compile(r".*reconros (up|down)\b|.*--clock wall|reconros experiment gateway --profile native")
 PROCESS = re.compile(r"reconros (router|board|client|status|gateway|map --live|run blink --mapping)\b")
 SHORTER = {
     "experiment roundtrip": ("--requests", "2"),
@@ -50,7 +51,7 @@ LISTENERS = {
 def commands() -> list[str]:
     """Return the command lines of the page, in their order and without comments."""
     lines = [line for block in blocks(README) for line in block.text.splitlines()]
-    return [shlex.join(shlex.split(line, comments=True)) for line in lines if line.startswith("reconros ")]
+    return [shlex.join(shlex.split(line, comments=True)) for line in lines if COMMAND.match(line)]
 
 
 def in_this_process() -> list[str]:
@@ -84,7 +85,7 @@ def test_the_commands_run_in_their_order(folder: Path) -> None:
     for command in in_this_process():
         more = next((more for start, more in SHORTER.items() if command.startswith(f"reconros {start}")), ())
         assert invoke(command, *more), command
-    made = ("times.png", "graph.svg", "my-board.toml", "blink/main.py", "results/virtual/roundtrips.png")
+    made = ("times.png", "graph.svg", "my-board.toml", "trace.png", "results/virtual/roundtrips.png")
     assert [name for name in made if not (folder / name).stat().st_size] == []
     assert json.loads((folder / "results/virtual/experiment.json").read_text(encoding="utf-8"))
 

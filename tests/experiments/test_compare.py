@@ -85,7 +85,8 @@ def test_the_records_hold_every_age_and_the_same_seed_gives_the_same(tmp_path: P
     assert list(told["mappings"]) == ["mixed"]
     record = read_record(tmp_path / "a" / "mixed" / "legangle.csv")
     assert record.values_ms.size == told["mappings"]["mixed"]["outputs"]["/legangle"]["sent"]
-    assert (tmp_path / "a" / "compare.png").read_bytes().startswith(b"\x89PNG")
+    for drawing in ("compare.png", "mixed/trace.png"):
+        assert (tmp_path / "a" / drawing).read_bytes().startswith(b"\x89PNG")
     for file in (tmp_path / "a").rglob("*.csv"):
         assert file.read_bytes() == (tmp_path / "b" / file.relative_to(tmp_path / "a")).read_bytes()
 

@@ -202,6 +202,20 @@ def test_clones_are_told_apart_in_the_json_alone(tmp_path: Path) -> None:
     assert shown == "0.5 s of virtual time\n"
 
 
+def test_what_each_board_did_is_traced_to_a_file_of_its_own(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("TRACE", str(tmp_path / "trace.json"))
+    run("-f", ROUNDTRIP, "--boards", 2, "--requests", 1, "--out", tmp_path / "out")
+    for number in range(2):
+        events = json.loads((tmp_path / f"trace-{number}.json").read_text())["traceEvents"]
+        assert events[0]["args"]["name"] == f"board0-{number}"
+        names = {event["args"]["name"] for event in events if event["name"] == "thread_name"}
+        assert names == {"software 0", "software 1", *(f"RS{n}" for n in range(4)), "ICAP", "DDS stack"}
+        calls = {event["name"] for event in events if event.get("cat") == "call"}
+        assert calls == {*CLIENTS, "in", "out"}
+
+
 def test_clones_do_not_notice_each_other() -> None:
     plan = read_deployment(ROUNDTRIP, os.environ).changed(10, 7)
     together = DeploymentRun([plan.clone(number) for number in range(3)])

@@ -115,6 +115,16 @@ def test_interrupted_it_shows_what_it_has_done_and_says_so(blink: Path, number: 
     assert (status["interrupted"], status["callbacks"]["count"]["calls"]) == (True, 3)
 
 
+def test_what_it_did_when_is_traced(blink: Path, tmp_path: Path) -> None:
+    path = tmp_path / "traces" / "blink.json"
+    command = ("run", blink, "--clock", "virtual", "--seconds", 0.25, "--trace", path)
+    assert invoke(*command).endswith(f"what ran where and when is in {path}\n")
+    events = json.loads(path.read_text())["traceEvents"]
+    assert [event["name"] for event in events if event.get("cat") == "call"] == ["count", "count", "count"]
+    with pytest.raises(UsageError, match=r"trace\.txt: a trace is written as \.json"):
+        invoke("run", blink, "--clock", "virtual", "--trace", tmp_path / "trace.txt")
+
+
 def test_times_of_nothing_are_explained(blink: Path) -> None:
     said = "native models nothing, so nothing took any time."
     assert said in invoke("run", blink, "--clock", "virtual", "--seconds", 0.25)

@@ -1,0 +1,91 @@
+"""What each part of a board did when, for people who want to look at it."""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import TYPE_CHECKING, NamedTuple
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from reconros_zenoh.board.spans import Stage
+    from reconros_zenoh.clock.virtual import VirtualEnvironment
+
+_KEPT = 200_000
+"""Some minutes of a busy board, and 30 MB."""
+
+
+class Slice(NamedTuple):
+    """A time in which a part did one thing: all of it, or one `stage` of it. In ns since the board began."""
+
+    track: str
+    name: str
+    stage: Stage | None
+    begin_ns: int
+    end_ns: int
+
+
+class Track:
+    """One line of a trace: a part that does one thing at a time."""
+
+    __slots__ = ("_environment", "_name", "_since_ns", "_slices", "name")
+
+    def __init__(self, environment: VirtualEnvironment, name: str, slices: deque[Slice]) -> None:
+        self._environment = environment
+        self._slices = slices
+        self.name = name
+        self._name: str | None = None
+        self._since_ns = 0
+
+    def begin(self, name: str) -> None:
+        """Note that the part begins to do this."""
+        self._name = name
+        self._since_ns = self._environment.now
+
+    def stage(self, stage: Stage, since_ns: int) -> None:
+        """Note that a stage of what the part does ends now."""
+        if self._name is not None:
+            now = self._environment.now
+            self._slices.append(Slice(self.name, self._name, stage, max(since_ns, self._since_ns), now))
+
+    def end(self) -> None:
+        """Note that it is done."""
+        self._slices.extend(self.unfinished())
+        self._name = None
+
+    def unfinished(self) -> Iterator[Slice]:
+        """Give what the part has been doing up to now, if it does anything."""
+        if self._name is not None:
+            yield Slice(self.name, self._name, None, self._since_ns, self._environment.now)
+
+
+class Trace:
+    """The tracks of a board, and the last 200,000 slices of what was done there.
+
+    There is one for the ICAP, whose work is named by the callback that it loads, one for the communication
+    stack, which works on messages on their way `in` or `out`, and one for each worker and gateway.
+    """
+
+    def __init__(self, environment: VirtualEnvironment) -> None:
+        self._environment = environment
+        self._began_ns = environment.now
+        self._slices: deque[Slice] = deque(maxlen=_KEPT)
+        self._workers: dict[str, Track] = {}
+        self.icap = Track(environment, "ICAP", self._slices)
+        self.stack = Track(environment, "DDS stack", self._slices)
+
+    def worker(self, name: str) -> Track:
+        """Return the track of a software worker, or of the worker or gateway in a slot."""
+        return self._workers.setdefault(name, Track(self._environment, name, self._slices))
+
+    @property
+    def tracks(self) -> Sequence[Track]:
+        """All tracks, the workers first."""
+        return (*self._workers.values(), self.icap, self.stack)
+
+    def slices(self) -> Iterator[Slice]:
+        """Give the slices in the order in which they ended, then what goes on still, up to now."""
+        began_ns = self._began_ns
+        going_on = (piece for track in self.tracks for piece in track.unfinished())
+        for piece in (*self._slices, *going_on):
+            yield piece._replace(begin_ns=piece.begin_ns - began_ns, end_ns=piece.end_ns - began_ns)
