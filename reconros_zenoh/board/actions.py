@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 from reconros_zenoh.board.sources import Event, Source
 from reconros_zenoh.board.spans import Timeline
@@ -15,11 +15,9 @@ from reconros_zenoh.ros.message_arrays import snapshot
 
 if TYPE_CHECKING:
     from reconros_zenoh.board.board import Board
-    from reconros_zenoh.board.stack_node import Arrived
     from reconros_zenoh.rmw.action_client import ActionEvent
     from reconros_zenoh.rmw.action_server import GoalHandle
     from reconros_zenoh.rmw.node import Node
-    from reconros_zenoh.rmw.received import Received
     from reconros_zenoh.ros.types import ActionType
 
 _DEPTH = 10
@@ -77,8 +75,8 @@ class ActionSource(Source):
         if self._check is not None:
             self._check(goal)
 
-    def _on_goal(self, handle: GoalHandle, received: Received) -> None:
-        self.enqueue(Event(handle, cast("Arrived", received).timeline, lasting=True))
+    def _on_goal(self, handle: GoalHandle, request: Event) -> None:
+        self.enqueue(Event(handle, request.timeline, lasting=True))
 
 
 class ActionClientSource(Source):

@@ -15,6 +15,8 @@ from reconros_zenoh.rmw.received import Received
 from reconros_zenoh.ros.qos import History, QosProfile
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from reconros_zenoh.board.board import Board
     from reconros_zenoh.rmw.node import Node
     from reconros_zenoh.ros.types import ServiceType
@@ -22,26 +24,33 @@ if TYPE_CHECKING:
 
 _log = logging.getLogger(__name__)
 _ANSWER_NS = 10_000_000_000
-UNSENT = "newer calls pushed it out before it was sent, or it cannot be sent"
-"""Why a call that has not left the board has no answer."""
+_UNSENT = "newer calls pushed it out before it was sent, or it cannot be sent"
 
 
 class ClientSource(Reader):
     """A service client: callbacks call with it, and it is ready while a response waits.
 
     Every call ends in one event: its callback gets the response as its message, or None when the server
-    refused or did not answer within 10 s, `check` refused the response, or the call was not sent,
-    because of calls that wait to be sent the last 10 are kept. The first None since the last response is
-    logged, `unanswered` counts them.
+    refused or did not answer in time (10 s unless `send` is told otherwise), `check` refused the response,
+    or the call was not sent, because of calls that wait to be sent the last 10 are kept. The first None
+    since the last response is logged, `unanswered` counts them.
     Responses come in the order in which they arrive and wait however long it takes; each call has a
     `sequence_number`, which stands on the wire as in ROS 2.
     """
 
     kind = CallbackKind.CLT
 
-    def __init__(self, board: Board, node: Node, service_type: ServiceType, name: str) -> None:
+    def __init__(
+        self,
+        board: Board,
+        node: Node,
+        service_type: ServiceType,
+        name: str,
+        on_matching: Callable[[bool], None] | None = None,
+    ) -> None:
+        """`on_matching` is as in `Transport.request`."""
         super().__init__(board, service_type.response, QosProfile(history=History.KEEP_ALL))
-        self._client = node.client(service_type, name)
+        self._client = node.client(service_type, name, on_matching)
         self._writer = Writer(board, QosProfile())
         self._is_answered = True
         self.unanswered = 0
@@ -63,13 +72,15 @@ class ClientSource(Reader):
         """Return the number of the next call; callable from any thread."""
         return self._client.next_sequence_number()
 
-    def send(self, parts: Parts, sequence_number: int, timeline: Timeline) -> None:
+    def send(
+        self, parts: Parts, sequence_number: int, timeline: Timeline, timeout_ns: int = _ANSWER_NS
+    ) -> None:
         """Call the service with an encoded request."""
         on_response = partial(self._on_response, sequence_number)
         call = partial(
-            self._client.call_encoded, parts, on_response, _ANSWER_NS, sequence_number=sequence_number
+            self._client.call_encoded, parts, on_response, timeout_ns, sequence_number=sequence_number
         )
-        unsent = partial(on_response, TransportError(UNSENT))
+        unsent = partial(on_response, TransportError(_UNSENT))
         self._writer.put(parts, timeline, call, unsent)
 
     def _on_response(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 from reconros_zenoh.board.spans import Timeline
 from reconros_zenoh.board.stream import Stream
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from reconros_zenoh.rmw.node import Node
     from reconros_zenoh.rmw.received import Received, Responder
     from reconros_zenoh.ros.types import MessageType, ServiceType
+    from reconros_zenoh.transport.base import Parts
 
 
 def _nobody() -> None:
@@ -118,16 +119,12 @@ class Source:
         self._on_ready()
 
 
-class _Incoming(NamedTuple):
-    """A message and its way to the reader's queue, which returns whether it got there."""
-
-    received: Received
-    timeline: Timeline
-    way: Generator[Awaitable, object, bool]
+_Way: TypeAlias = "Generator[Awaitable, object, bool]"
+"""Of a message to the queue of its reader; returns whether it got there."""
 
 
 class Reader(Source):
-    """The queue of messages behind the communication stack: base of subscriptions and service servers.
+    """Messages that come through the communication stack: base of subscriptions, servers and clients.
 
     It keeps the last `depth` messages (KEEP_LAST) or all (KEEP_ALL), and counts in `dropped` what it pushed
     out or, with best effort, lost.
@@ -140,7 +137,7 @@ class Reader(Source):
         self._board = board
         self.message_type = message_type
         self._reliable = qos.reliability is Reliability.RELIABLE
-        self._stream: Stream[_Incoming] = Stream(self._receive, qos.queue_depth)
+        self._stream: Stream[tuple[Received, Timeline, _Way]] = Stream(self._receive, qos.queue_depth)
 
     @property
     def dropped(self) -> int:
@@ -155,9 +152,9 @@ class Reader(Source):
         environment = self._board.environment
         timeline = Timeline(environment, environment.now - received.transit_ns)
         way = self._board.dds.receive(received.size, received.transit_ns, timeline, reliable=self._reliable)
-        self._stream.put(_Incoming(received, timeline, way))
+        self._stream.put((received, timeline, way))
 
-    def _receive(self, incoming: _Incoming) -> Generator[Awaitable, object, None]:
+    def _receive(self, incoming: tuple[Received, Timeline, _Way]) -> Generator[Awaitable, object, None]:
         received, timeline, way = incoming
         if (yield from way):
             self.enqueue(
@@ -215,9 +212,7 @@ class SubscriptionSource(Reader):
         if not known and self._admits(received.publisher):
             super().arrive(received)
 
-    def deliver(
-        self, received: Received, timeline: Timeline, way: Generator[Awaitable, object, bool]
-    ) -> None:
+    def deliver(self, received: Received, timeline: Timeline, way: _Way) -> None:
         """Accept a message from this board once it has gone its way."""
         if not self._admits(received.publisher):
             return
@@ -227,7 +222,7 @@ class SubscriptionSource(Reader):
         except BadMessageError as error:
             self._board.context.rejections.add(self._topic, received.publisher.hex(), error)
             return
-        self._stream.put(_Incoming(received, timeline, way))
+        self._stream.put((received, timeline, way))
 
     def _admits(self, publisher: bytes) -> bool:
         return self._own is None or self._own.passes(publisher)
@@ -252,8 +247,11 @@ class ServiceSource(Reader):
     def answer(self, event: Event, response: object) -> None:
         """Send the response to the client."""
         assert event.responder is not None
-        parts = self._type.response.encode(response)
-        self._writer.put(parts, event.timeline, partial(event.responder.respond_encoded, parts))
+        self.send(self._type.response.encode(response), event.responder, event.timeline)
+
+    def send(self, parts: Parts, responder: Responder, timeline: Timeline) -> None:
+        """Send an encoded response."""
+        self._writer.put(parts, timeline, partial(responder.respond_encoded, parts))
 
     def fail(self, event: Event, text: str) -> None:
         """Tell the client that there will be no response, and why."""

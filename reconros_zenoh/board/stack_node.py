@@ -4,149 +4,115 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, TypeAlias
 
-from reconros_zenoh.board.clients import UNSENT
+from reconros_zenoh.board.clients import ClientSource
+from reconros_zenoh.board.sources import ServiceSource, SubscriptionSource
 from reconros_zenoh.board.spans import Timeline
-from reconros_zenoh.board.stream import Stream
-from reconros_zenoh.board.writers import Writer
+from reconros_zenoh.board.writers import TopicWriter
 from reconros_zenoh.errors import TransportError
-from reconros_zenoh.rmw.received import Received
 from reconros_zenoh.ros.names import resolve
-from reconros_zenoh.ros.qos import QosProfile
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Generator
+    from collections.abc import Callable
 
     from reconros_zenoh.board.board import Board
-    from reconros_zenoh.clock.activity import Awaitable
+    from reconros_zenoh.board.sources import Event, Source
     from reconros_zenoh.errors import BadMessageError
-    from reconros_zenoh.rmw.client import Client
-    from reconros_zenoh.rmw.node import Context, Node
-    from reconros_zenoh.rmw.publisher import Publisher
+    from reconros_zenoh.rmw.node import Node
     from reconros_zenoh.rmw.received import Responder
+    from reconros_zenoh.ros.qos import QosProfile
     from reconros_zenoh.ros.types import MessageType, ServiceType
     from reconros_zenoh.transport.base import Parts
 
-
-class Arrived(NamedTuple):
-    """A message that has come through the stack: a `Received` with its timeline so far."""
-
-    message: Any
-    size: int
-    transit_ns: int
-    responder: Responder | None
-    publisher: bytes
-    timeline: Timeline
+_Begin: TypeAlias = "Callable[[Callable[[Timeline], object]], None]"
+"""Has the event loop send something, with a timeline that begins then; callable from any thread."""
 
 
 class StackNode:
-    """A node's ends on a board: like those of `Node`, but each message costs what the stack takes.
+    """A node's ends on a board, made of the sources and writers of callbacks: each message costs the stack.
 
-    Sinks are called by the event loop; what sends may be called from any thread. What is sent is counted in
-    the board's spans under the absolute name of `whole`, what the ends belong to: an action, or `~`, the node
-    itself. Callbacks have no such names.
+    Sinks get an `Event` and are called by the event loop; what sends may be called from any thread. What is
+    sent is counted in the board's spans under the absolute name of `whole`, what the ends belong to: an
+    action, or `~`, the node itself. Callbacks have no such names.
     """
 
     def __init__(self, board: Board, node: Node, whole: str) -> None:
         self._board = board
         self._node = node
         self._label = resolve(whole, node.namespace, node.name)
+        self.context = node.context
+        self.fully_qualified_name = node.fully_qualified_name
 
-    @property
-    def context(self) -> Context:
-        """The session of the node."""
-        return self._node.context
-
-    @property
-    def fully_qualified_name(self) -> str:
-        """The name of the node behind its namespace."""
-        return self._node.fully_qualified_name
-
-    def publisher(self, message_type: MessageType, topic: str, qos: QosProfile) -> StackPublisher:
+    def publisher(self, message_type: MessageType, topic: str, qos: QosProfile) -> _Publisher:
         """Return a new publisher."""
-        publisher = self._node.publisher(message_type, topic, qos)
-        return StackPublisher(publisher, _StackWriter(self._board, qos, self._label))
+        return _Publisher(self._begin, TopicWriter(self._board, self._node, message_type, topic, qos))
 
     def subscription(
-        self, message_type: MessageType, topic: str, sink: Callable[[Arrived], None], qos: QosProfile
+        self, message_type: MessageType, topic: str, sink: Callable[[Event], None], qos: QosProfile
     ) -> None:
         """Have the messages of a topic handed to `sink`."""
-        arrivals = Arrivals(self._board, sink, qos.depth, self._label)
-        self._node.subscription(message_type, topic, arrivals.accept, qos)
+        _hand_over(SubscriptionSource(self._board, self._node, message_type, topic, qos), sink)
 
-    def service(self, service_type: ServiceType, name: str, sink: Callable[[Arrived], None]) -> None:
+    def service(self, service_type: ServiceType, name: str, sink: Callable[[Event], None]) -> None:
         """Have the requests of a service handed to `sink`."""
-        writer = _StackWriter(self._board, QosProfile(), self._label)
+        source = ServiceSource(self._board, self._node, service_type, name)
 
-        def answerable(arrived: Arrived) -> None:
-            assert arrived.responder is not None
-            sink(arrived._replace(responder=_StackResponder(writer, arrived.responder)))
+        def answerable(event: Event) -> None:
+            assert event.responder is not None
+            sink(event._replace(responder=_Responder(self._begin, source, event.responder)))
 
-        arrivals = Arrivals(self._board, answerable, QosProfile().depth, self._label)
-        self._node.service(service_type, name, arrivals.accept)
+        _hand_over(source, answerable)
 
     def client(
         self, service_type: ServiceType, name: str, on_matching: Callable[[bool], None] | None = None
-    ) -> StackClient:
+    ) -> _Client:
         """Return a new service client; `on_matching` as in `Transport.request`."""
-        return StackClient(self._board, self._node.client(service_type, name, on_matching), self._label)
+        return _Client(self._begin, ClientSource(self._board, self._node, service_type, name, on_matching))
 
+    def _begin(self, send: Callable[[Timeline], object]) -> None:
+        self._board.environment.post(self._send, send)
 
-class Arrivals:
-    """Takes messages through the stack in order and hands them to `sink`; KEEP_LAST of `depth`."""
-
-    def __init__(self, board: Board, sink: Callable[[Arrived], None], depth: int, label: str) -> None:
-        self._board = board
-        self._sink = sink
-        self._label = label
-        self._stream: Stream[Arrived] = Stream(self._receive, depth)
-
-    def accept(self, received: Received) -> None:
-        """Accept a message from the transport; callable from any thread."""
-        self._board.environment.post(self._enter, received)
-
-    def _enter(self, received: Received) -> None:
-        environment = self._board.environment
-        timeline = Timeline(environment, environment.now - received.transit_ns)
+    def _send(self, send: Callable[[Timeline], object]) -> None:
+        timeline = Timeline(self._board.environment, self._board.environment.now)
         timeline.callback = self._label
-        self._stream.put(
-            Arrived(
-                received.message,
-                received.size,
-                received.transit_ns,
-                received.responder,
-                received.publisher,
-                timeline,
-            )
-        )
-
-    def _receive(self, arrived: Arrived) -> Generator[Awaitable, object, None]:
-        yield from self._board.dds.receive(arrived.size, arrived.transit_ns, arrived.timeline)
-        self._sink(arrived)
+        send(timeline)
 
 
-class StackPublisher:
-    """A publisher whose messages go through the stack."""
+def _hand_over(source: Source, sink: Callable[[Event], None]) -> None:
+    """Let the sink have each event as soon as it comes."""
+    source.open(lambda: sink(source.take()))
 
-    def __init__(self, publisher: Publisher, writer: _StackWriter) -> None:
-        self._publisher = publisher
-        self._writer = writer
+
+@dataclass(frozen=True, slots=True)
+class _Publisher:
+    begin: _Begin
+    writer: TopicWriter
 
     def publish(self, message: object) -> None:
         """Publish the message; raises UsageError when it is not of the topic's type."""
-        parts = self._publisher.message_type.encode(message)
-        self._writer.put(parts, partial(self._publisher.publish_encoded, parts))
+        self.begin(partial(self.writer.send, self.writer.encode(message)))
 
 
-class StackClient:
-    """A service client whose requests and responses go through the stack."""
+@dataclass(frozen=True, slots=True)
+class _Responder:
+    begin: _Begin
+    source: ServiceSource
+    responder: Responder
 
-    def __init__(self, board: Board, client: Client, label: str) -> None:
-        self._board = board
-        self._client = client
-        self._writer = _StackWriter(board, QosProfile(), label)
-        self._label = label
+    def respond_encoded(self, parts: Parts) -> None:
+        self.begin(partial(self.source.send, parts, self.responder))
+
+    def fail(self, text: str) -> None:
+        self.responder.fail(text)
+
+
+class _Client:
+    def __init__(self, begin: _Begin, source: ClientSource) -> None:
+        self._begin = begin
+        self._source = source
+        self._waiting: dict[int, Callable[[Any], None]] = {}
+        _hand_over(source, self._on_event)
 
     def call(
         self,
@@ -155,48 +121,11 @@ class StackClient:
         timeout_ns: int,
     ) -> None:
         """Call the service, as `Client.call`; `on_response` is called by the event loop."""
-        parts = self._client.service_type.request.encode(request)
-        arrivals = Arrivals(self._board, lambda arrived: on_response(arrived.message), 1, self._label)
+        parts, number = self._source.encode(request), self._source.next_sequence_number()
+        self._waiting[number] = on_response
+        self._begin(partial(self._source.send, parts, number, timeout_ns=timeout_ns))
 
-        def on_received(received: Received | BadMessageError | TransportError) -> None:
-            if isinstance(received, Received):
-                arrivals.accept(received)
-            else:
-                self._board.environment.post(on_response, received)
-
-        send = partial(self._client.call_encoded, parts, on_received, timeout_ns)
-        unsent = partial(on_received, TransportError(UNSENT))
-        self._writer.put(parts, send, unsent)
-
-
-@dataclass(frozen=True, slots=True)
-class _StackResponder:
-    """Sends a response through the stack."""
-
-    writer: _StackWriter
-    responder: Responder
-
-    def respond_encoded(self, parts: Parts) -> None:
-        self.writer.put(parts, partial(self.responder.respond_encoded, parts))
-
-    def fail(self, text: str) -> None:
-        self.responder.fail(text)
-
-
-class _StackWriter:
-    """A `Writer` for any thread, whose messages begin here and are counted under `label`."""
-
-    def __init__(self, board: Board, qos: QosProfile, label: str) -> None:
-        self._environment = board.environment
-        self._writer = Writer(board, qos)
-        self._label = label
-
-    def put(
-        self, parts: Parts, send: Callable[[], None], on_dropped: Callable[[], object] = lambda: None
-    ) -> None:
-        self._environment.post(self._put, parts, send, on_dropped)
-
-    def _put(self, parts: Parts, send: Callable[[], None], on_dropped: Callable[[], object]) -> None:
-        timeline = Timeline(self._environment, self._environment.now)
-        timeline.callback = self._label
-        self._writer.put(parts, timeline, send, on_dropped)
+    def _on_event(self, event: Event) -> None:
+        assert event.sequence_number is not None
+        on_response = self._waiting.pop(event.sequence_number)
+        on_response(TransportError("no answer, see the log") if event.message is None else event.message)

@@ -83,7 +83,7 @@ class GoalHandle:
 
 
 class ActionServer:
-    """Serves one action: `on_goal` gets each accepted goal and what it came with.
+    """Serves one action: `on_goal` gets each accepted goal and the request that it came with.
 
     `accept` tells whether a goal is accepted; it raises BadMessageError with the reason of a refusal, which
     is counted and logged by the context. The last 100 goals that have ended keep their results. Deviation:
@@ -95,7 +95,7 @@ class ActionServer:
         node: NodeEnds,
         action_type: ActionType,
         name: str,
-        on_goal: Callable[[GoalHandle, Received], None],
+        on_goal: Callable[[GoalHandle, Any], None],
         accept: Callable[[Any], None],
     ) -> None:
         self._context = node.context

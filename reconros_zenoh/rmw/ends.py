@@ -33,7 +33,7 @@ class ClientEnd(Protocol):
 
 
 class NodeEnds(Protocol):
-    """Makes the ends of topics and services of one node, as `Node` does; sinks get a `Received`, or more."""
+    """Makes the ends of topics and services of one node, as `Node` does; sinks get a `Received` or alike."""
 
     @property
     def context(self) -> Context:

@@ -259,7 +259,21 @@ def test_a_client_cancels_its_goal(hardware: bool) -> None:
     assert case.run(0, -1) == ["accepted", "canceling"]
 
 
-def test_goals_that_are_pushed_out_before_they_are_sent_are_told_as_unanswered() -> None:
+def test_results_come_in_the_order_in_which_they_were_sent_also_when_a_fragment_is_lost() -> None:
+    profile = small_profile(
+        {"ask": (10, 10), "hear": (10, 10)}, large_from=200, loss_probability=1, heartbeat_ns=10**6
+    )
+    case = Asking(hardware=False, profile=profile)
+    case.run(0, 4)
+    for handle, length in zip(case.handles, (100, 1), strict=True):
+        case.server.finish(handle, FIBONACCI.result.cls(sequence=np.zeros(length, np.int32)))
+    case.board.environment.run(until=10**9)
+    assert [event.goal_id for event in case.events if event.kind == "result"] == case.sent
+
+
+def test_goals_that_are_pushed_out_before_they_are_sent_are_told_as_unanswered(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
     profile = small_profile({"ask": (10, 10), "hear": (10, 10)}, dds_message_ns=1000)
     case = Asking(hardware=False, profile=profile)
     for _ in range(15):
@@ -268,6 +282,7 @@ def test_goals_that_are_pushed_out_before_they_are_sent_are_told_as_unanswered()
     kinds = {event.goal_id: event.kind for event in case.events}
     assert len(case.handles) == 11
     assert [kinds[goal_id] for goal_id in case.sent] == ["accepted"] + ["unanswered"] * 4 + ["accepted"] * 10
+    assert "a call of service /fibonacci/_action/send_goal has no answer: newer calls" in caplog.text
 
 
 def test_old_feedback_makes_room_and_nothing_else_does() -> None:
