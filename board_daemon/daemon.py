@@ -17,14 +17,14 @@ if TYPE_CHECKING:
     from board_daemon.hosting import BoardOptions
     from reconros_zenoh.board.profile import Profile
     from reconros_zenoh.project.loader import Project
-    from reconros_zenoh.project.mapping_file import Mapping
+    from reconros_zenoh.project.mapping_file import ProjectMapping
 
 
 def run_board(
     router: str,
     profile: Profile,
     project: Project,
-    mapping: Mapping,
+    mapping: ProjectMapping,
     options: BoardOptions,
     on_ready: Callable[[], None],
     seconds: float | None = None,

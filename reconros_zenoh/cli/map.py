@@ -32,14 +32,14 @@ if TYPE_CHECKING:
     from reconros_zenoh.mapping.communication import TopicMapping
     from reconros_zenoh.mapping.graph import ComputationGraph, Edge
     from reconros_zenoh.project.loader import ProjectFiles
-    from reconros_zenoh.project.mapping_file import Mapping as NodeMapping
+    from reconros_zenoh.project.mapping_file import ProjectMapping
 
 
 class _MappedProject(NamedTuple):
     """A project, and which of its callbacks runs where."""
 
     files: ProjectFiles
-    mapping: NodeMapping
+    mapping: ProjectMapping
 
 
 def map_communication(

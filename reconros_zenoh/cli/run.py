@@ -31,7 +31,7 @@ from reconros_zenoh.project.loader import load_project
 if TYPE_CHECKING:
     from reconros_zenoh.board.profile import Profile
     from reconros_zenoh.project.loader import Project
-    from reconros_zenoh.project.mapping_file import Mapping
+    from reconros_zenoh.project.mapping_file import ProjectMapping
 
 _VIRTUAL_S = 10.0
 
@@ -94,7 +94,7 @@ def run(
 
 
 def _run_virtual(
-    profile: Profile, project: Project, mapping: Mapping, options: BoardOptions, seconds: float
+    profile: Profile, project: Project, mapping: ProjectMapping, options: BoardOptions, seconds: float
 ) -> dict[str, Any]:
     """Return the status of the board after so many seconds of virtual time, or at Ctrl-C."""
     from reconros_zenoh.experiments.simulation import Simulation

@@ -19,7 +19,7 @@ from reconros_zenoh.experiments.interruption import until_interrupted
 from reconros_zenoh.experiments.profile_file import varied
 from reconros_zenoh.experiments.provenance import host
 from reconros_zenoh.experiments.roundtrip import application
-from reconros_zenoh.project.mapping_file import CallbackMapping, Mapping
+from reconros_zenoh.project.mapping_file import CallbackMapping, ProjectMapping
 from reconros_zenoh.rmw.node import Context
 from reconros_zenoh.transport.simulated import SimulatedNetwork
 
@@ -167,11 +167,11 @@ def run_alone(
     return Isolated(stages_ms, watch.elapsed_ms, watch.kernel_ms, board.host.overruns.count)
 
 
-def _alone(project: Project, callback: str, place: Place) -> Mapping:
+def _alone(project: Project, callback: str, place: Place) -> ProjectMapping:
     """Return a mapping under which this callback has a worker and no other callback has a place."""
     (slot, *_) = next(thread.slots for thread in project.configuration.threads if thread.name == callback)
     in_hardware = place == "hardware"
-    return Mapping(
+    return ProjectMapping(
         name=f"{callback} alone in {place}",
         executor="reconros",
         software_workers=0 if in_hardware else 1,

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from reconros_zenoh.board.profile import Profile
     from reconros_zenoh.measure.record import RoundTrip
     from reconros_zenoh.project.loader import Project
-    from reconros_zenoh.project.mapping_file import Mapping as CallbackMapping
+    from reconros_zenoh.project.mapping_file import ProjectMapping
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +33,7 @@ class BoardPlan:
 
     profile: Profile
     project: Project
-    mapping: CallbackMapping
+    mapping: ProjectMapping
     options: BoardOptions
 
 

@@ -18,7 +18,7 @@ from reconros_zenoh.errors import ExperimentError, UsageError
 from reconros_zenoh.experiments.interruption import until_interrupted
 from reconros_zenoh.experiments.provenance import host
 from reconros_zenoh.project.loader import load_project
-from reconros_zenoh.project.mapping_file import CallbackMapping, Mapping
+from reconros_zenoh.project.mapping_file import CallbackMapping, ProjectMapping
 from reconros_zenoh.transport.simulated import SimulatedNetwork
 
 if TYPE_CHECKING:
@@ -149,10 +149,10 @@ def anchors(cells: Iterable[Cell]) -> list[dict[str, Any]]:
     return rows
 
 
-def setup_mapping(publisher: Publisher, count: int) -> Mapping:
+def setup_mapping(publisher: Publisher, count: int) -> ProjectMapping:
     """Return the mapping with this publisher and so many hardware subscribers; other nodes have no place."""
     nowhere = CallbackMapping()
-    return Mapping(
+    return ProjectMapping(
         name=f"{publisher} publisher, {count} hardware subscribers",
         executor="reconros",
         software_workers=2,

@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from reconros_zenoh.clock.activity import Awaitable
     from reconros_zenoh.experiments.gateway import Variant
     from reconros_zenoh.project.application import Application
-    from reconros_zenoh.project.mapping_file import Mapping
+    from reconros_zenoh.project.mapping_file import ProjectMapping
 
 _TOPIC = "/a"
 _TYPE = "sensor_msgs/msg/Image"
@@ -113,7 +113,7 @@ def run_board(connection: Connection, router: str, variant: Variant, count: int)
             hosted.close()
 
 
-def _hardware_only(mapping: Mapping) -> Mapping:
+def _hardware_only(mapping: ProjectMapping) -> ProjectMapping:
     """Return the mapping without its software nodes, which have processes of their own."""
     places = {name: place if place.slots else CallbackMapping() for name, place in mapping.callbacks.items()}
     return mapping.model_copy(update={"callbacks": places})

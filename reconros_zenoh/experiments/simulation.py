@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from reconros_zenoh.board.profile import Profile
     from reconros_zenoh.measure.record import RoundTrip
     from reconros_zenoh.project.loader import Project
-    from reconros_zenoh.project.mapping_file import Mapping
+    from reconros_zenoh.project.mapping_file import ProjectMapping
     from reconros_zenoh.ros.types import TypeRegistry
 
 _SEEDS_KEPT = 4  # 15 MB each
@@ -75,7 +75,7 @@ class Simulation:
         self._network = SimulatedNetwork(self.environment)
 
     def add_board(
-        self, profile: Profile, project: Project, mapping: Mapping, options: BoardOptions
+        self, profile: Profile, project: Project, mapping: ProjectMapping, options: BoardOptions
     ) -> HostedBoard:
         """Return a board that serves from the beginning; raise UsageError when it cannot host the project."""
         transport = self._network.transport(f"{next(self._sessions):x}")
@@ -156,7 +156,7 @@ class Simulation:
             self.environment.run(until=round(seconds * 1e9))
 
 
-def check_hosting(profile: Profile, project: Project, mapping: Mapping) -> None:
+def check_hosting(profile: Profile, project: Project, mapping: ProjectMapping) -> None:
     """Raise UsageError or FileError when no board of this kind can host the project under this mapping."""
     with Simulation(project.types()) as simulation:
         simulation.add_board(profile, project, mapping, BoardOptions())
