@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -15,6 +14,7 @@ from reconros_zenoh.cli.options import AsJson, ClockName, Out, Profile
 from reconros_zenoh.cli.progress import run_bar
 from reconros_zenoh.errors import UsageError
 from reconros_zenoh.experiments.provenance import own_folder, writing
+from reconros_zenoh.mapping.graph import Side
 from reconros_zenoh.measure.findings import host_troubles
 
 if TYPE_CHECKING:
@@ -30,16 +30,9 @@ _RESULT = "gateway.json"
 _FIGURES = {"hardware": "fig6_hardware_publisher.png", "software": "fig7_software_publisher.png"}
 
 
-class PublisherName(StrEnum):
-    """Where the publisher runs."""
-
-    HARDWARE = "hardware"
-    SOFTWARE = "software"
-
-
 def gateway(
     publisher: Annotated[
-        PublisherName | None, typer.Option(help="Where the publisher runs.", show_default="both")
+        Side | None, typer.Option(help="Where the publisher runs.", show_default="both")
     ] = None,
     clock: Annotated[
         ClockName | None, typer.Option(help="Real time, or virtual time.", show_default="virtual")
@@ -58,17 +51,17 @@ def gateway(
     real processes, publisher and subscriber in software.
     """
     from reconros_zenoh.board.profile import read_profile
-    from reconros_zenoh.experiments.gateway import PUBLISHERS, measure_gateway
+    from reconros_zenoh.experiments.gateway import measure_gateway
     from reconros_zenoh.experiments.gateway_native import measure_native
 
     byte_counts, counts = _sizes(sizes), _counts(subscribers)
     board = read_profile(profile)
     time: Clock = "wall" if clock is ClockName.WALL else "virtual"
-    publishers = [name for name in PUBLISHERS if publisher is None or name == publisher.value]
+    publishers = list(Side) if publisher is None else [publisher]
     if board.model is None:
-        if clock is ClockName.VIRTUAL or publisher is PublisherName.HARDWARE:
+        if clock is ClockName.VIRTUAL or publisher is Side.HARDWARE:
             raise UsageError("profile native runs in real time, with the publisher in software.")
-        publishers = ["software"]
+        publishers = [Side.SOFTWARE]
     with own_folder(out):
         _prepare(out)
         with run_bar("cells", len(publishers) * len(byte_counts) * len(counts), quiet=as_json) as advance:

@@ -12,6 +12,7 @@ from rich.text import Text
 from reconros_zenoh.cli.console import interrupted, titled_table, wide_console
 from reconros_zenoh.cli.options import AsJson, ClockName, Profile
 from reconros_zenoh.cli.progress import run_bar
+from reconros_zenoh.mapping.graph import Side
 from reconros_zenoh.measure.statistics import format_error, format_ms, format_share
 
 if TYPE_CHECKING:
@@ -41,11 +42,11 @@ def callbacks(
     kernels stand beside it.
     """
     from reconros_zenoh.board.profile import read_profile
-    from reconros_zenoh.experiments.callbacks import PLACES, TABLE_I, measure_callbacks
+    from reconros_zenoh.experiments.callbacks import TABLE_I, measure_callbacks
 
     digits = _classified(accuracy) if accuracy else {}
     model = read_profile(profile)
-    with run_bar("callbacks alone", len(TABLE_I) * len(PLACES), quiet=as_json) as advance:
+    with run_bar("callbacks alone", len(TABLE_I) * len(Side), quiet=as_json) as advance:
         result = measure_callbacks(clock.value, model, repeat, advance) | digits
     if as_json:
         print(json.dumps(result))

@@ -25,6 +25,7 @@ from reconros_zenoh.clock.virtual import succeed_once
 from reconros_zenoh.clock.wall import WallEnvironment
 from reconros_zenoh.executor.callbacks import CallbackKind
 from reconros_zenoh.experiments.gateway import setup_mapping
+from reconros_zenoh.mapping.graph import Side
 from reconros_zenoh.project.loader import load_project
 from reconros_zenoh.project.mapping_file import CallbackMapping
 from reconros_zenoh.rmw.node import Context
@@ -96,7 +97,7 @@ def run_board(connection: Connection, router: str, variant: Variant, count: int)
             transport,
             read_profile("native"),
             replace(project, main=partial(_run_hardware_nodes, receiver)),
-            _hardware_only(setup_mapping("software", count)),
+            _hardware_only(setup_mapping(Side.SOFTWARE, count)),
             BoardOptions(),
         )
 
