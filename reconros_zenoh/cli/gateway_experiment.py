@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.text import Text
 
-from reconros_zenoh.cli.console import interrupted, titled_table, wide_console
+from reconros_zenoh.cli.console import interrupted, new_table, wide_console
 from reconros_zenoh.cli.options import AsJson, ClockName, Out, Profile
 from reconros_zenoh.cli.progress import run_bar
 from reconros_zenoh.errors import UsageError
@@ -103,7 +103,7 @@ def _write(out: Path, result: dict[str, Any]) -> list[Path]:
 
 def _print(console: Console, result: dict[str, Any]) -> None:
     for publisher in dict.fromkeys(cell["publisher"] for cell in result["cells"]):
-        table = titled_table(f"from {publisher}: ms to the slowest subscriber in HW, and in SW", 1)
+        table = new_table(title=f"from {publisher}: ms to the slowest subscriber in HW, and in SW", padding=1)
         for column in ("kB", "subscribers", *_to("HW"), *_to("SW")):
             table.add_column(column, justify="right", vertical="bottom", no_wrap=True)
         for cell in result["cells"]:
