@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from board_daemon.hosting import HostedBoard
 from reconros_zenoh.board.control import ControlServer, claim_name, status
 from reconros_zenoh.board.gateway_control import GatewayServer
 from reconros_zenoh.clock.process import begin_process
 from reconros_zenoh.clock.virtual import succeed_once
+from reconros_zenoh.project.hosting import HostedBoard
 from reconros_zenoh.transport.zenoh import ZenohTransport
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from board_daemon.hosting import BoardOptions
     from reconros_zenoh.board.profile import Profile
+    from reconros_zenoh.project.hosting import BoardOptions
     from reconros_zenoh.project.loader import Project
     from reconros_zenoh.project.mapping_file import ProjectMapping
 

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from board_daemon.hosting import BoardOptions
 from reconros_zenoh.board.control import status
 from reconros_zenoh.cli.console import interrupted, wide_console
 from reconros_zenoh.cli.options import (
@@ -26,6 +25,7 @@ from reconros_zenoh.cli.options import (
     project_prints,
 )
 from reconros_zenoh.cli.status_screen import print_status
+from reconros_zenoh.project.hosting import BoardOptions
 from reconros_zenoh.project.loader import load_project
 
 if TYPE_CHECKING:

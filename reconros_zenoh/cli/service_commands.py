@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 import typer
 from typer.main import get_command
 
-from board_daemon.hosting import BoardOptions
 from deploy.compose import StartCondition, read_compose
 from host_clients.camera import CameraOptions
 from host_clients.daemon import ClientOptions
@@ -20,6 +19,7 @@ from reconros_zenoh.cli import daemons, desktop
 from reconros_zenoh.errors import FileError, UsageError
 from reconros_zenoh.experiments.deployment import BoardPlan, DeploymentPlan
 from reconros_zenoh.experiments.roundtrip import application_folder
+from reconros_zenoh.project.hosting import BoardOptions
 from reconros_zenoh.project.loader import load_project
 from reconros_zenoh.yaml_node import YamlNode
 

@@ -7,7 +7,6 @@ import time
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from board_daemon.hosting import BoardOptions, HostedBoard
 from host_clients.closed_loop import ClosedLoop
 from host_clients.suite import exchange
 from reconros_zenoh.board.host import Host, computed
@@ -20,6 +19,7 @@ from reconros_zenoh.experiments.profile_file import varied
 from reconros_zenoh.experiments.provenance import host
 from reconros_zenoh.experiments.roundtrip import application
 from reconros_zenoh.mapping.graph import Side
+from reconros_zenoh.project.hosting import BoardOptions, HostedBoard
 from reconros_zenoh.project.mapping_file import CallbackMapping, ProjectMapping
 from reconros_zenoh.rmw.node import Context
 from reconros_zenoh.transport.simulated import SimulatedNetwork

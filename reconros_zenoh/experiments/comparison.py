@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from board_daemon.hosting import BoardOptions
 from reconros_zenoh.board.control import status
 from reconros_zenoh.experiments.simulation import Simulation
 from reconros_zenoh.experiments.stimulus import feed
 from reconros_zenoh.mapping.project_graph import OUTSIDE, read_project_graph, topic_ends
 from reconros_zenoh.measure.record import RecordWriter, RoundTrip
 from reconros_zenoh.measure.statistics import summarise
+from reconros_zenoh.project.hosting import BoardOptions
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

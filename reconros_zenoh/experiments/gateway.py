@@ -8,7 +8,6 @@ from importlib.resources import as_file, files
 from itertools import product
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
-from board_daemon.hosting import BoardOptions, HostedBoard
 from reconros_zenoh.applications.gateway.nodes import SUBSCRIBERS, random_body, run_nodes
 from reconros_zenoh.board.sources import Event, Source
 from reconros_zenoh.board.spans import Timeline
@@ -18,6 +17,7 @@ from reconros_zenoh.errors import ExperimentError, UsageError
 from reconros_zenoh.experiments.interruption import until_interrupted
 from reconros_zenoh.experiments.provenance import host
 from reconros_zenoh.mapping.graph import Side
+from reconros_zenoh.project.hosting import BoardOptions, HostedBoard
 from reconros_zenoh.project.loader import load_project
 from reconros_zenoh.project.mapping_file import CallbackMapping, ProjectMapping
 from reconros_zenoh.transport.simulated import SimulatedNetwork

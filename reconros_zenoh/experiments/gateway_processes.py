@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from board_daemon.hosting import BoardOptions, HostedBoard
 from reconros_zenoh.applications.gateway.nodes import random_body
 from reconros_zenoh.board.executor import Executor
 from reconros_zenoh.board.profile import read_profile
@@ -26,6 +25,7 @@ from reconros_zenoh.clock.wall import WallEnvironment
 from reconros_zenoh.executor.callbacks import CallbackKind
 from reconros_zenoh.experiments.gateway import setup_mapping
 from reconros_zenoh.mapping.graph import Side
+from reconros_zenoh.project.hosting import BoardOptions, HostedBoard
 from reconros_zenoh.project.loader import load_project
 from reconros_zenoh.project.mapping_file import CallbackMapping
 from reconros_zenoh.rmw.node import Context

@@ -8,7 +8,6 @@ from functools import lru_cache
 from itertools import count
 from typing import TYPE_CHECKING, Self
 
-from board_daemon.hosting import BoardOptions, HostedBoard
 from host_clients.camera import Camera
 from host_clients.closed_loop import ClosedLoop
 from host_clients.group import gather
@@ -19,6 +18,7 @@ from host_clients.viewer import Viewer
 from reconros_zenoh.clock.process import tune_memory
 from reconros_zenoh.clock.virtual import VirtualEnvironment
 from reconros_zenoh.errors import TransportError
+from reconros_zenoh.project.hosting import BoardOptions, HostedBoard
 from reconros_zenoh.rmw.node import Context
 from reconros_zenoh.transport.simulated import SimulatedNetwork
 

@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from board_daemon.hosting import BoardOptions, HostedBoard
 from reconros_zenoh.applications.gateway.nodes import ImagePublisher, random_body, run_nodes
 from reconros_zenoh.board.profile import read_profile
 from reconros_zenoh.cli.experiment import app
@@ -28,6 +27,7 @@ from reconros_zenoh.experiments.gateway import (
 )
 from reconros_zenoh.mapping.graph import Side
 from reconros_zenoh.measure.gateway_plots import transmission_figure
+from reconros_zenoh.project.hosting import BoardOptions, HostedBoard
 from reconros_zenoh.project.loader import load_project
 from reconros_zenoh.transport.simulated import SimulatedNetwork
 

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from board_daemon.hosting import BoardOptions, HostedBoard
 from reconros_zenoh.board.profile import read_profile
 from reconros_zenoh.clock.virtual import VirtualEnvironment
 from reconros_zenoh.errors import UsageError
+from reconros_zenoh.project.hosting import BoardOptions, HostedBoard
 from reconros_zenoh.project.loader import load_project
 from reconros_zenoh.project.mapping_file import ProjectMapping
 from reconros_zenoh.rmw.action_client import ActionClient
