@@ -188,19 +188,13 @@ def _check_callback(
             f"The callback {name} is mapped to slots, but the standard executor knows only software.",
             'Use `executor = "reconros"` or take the slots away.',
         )
-    if callback.slots and mapping.hardware_workers == 0:
-        raise error(
-            ["slots"],
-            f"The callback {name} is mapped to slots, but there are 0 hardware workers.",
-            "Raise `hardware_workers`.",
-        )
     served = sorted(slots)[: mapping.hardware_workers]
     unserved = [slot for slot in callback.slots if slot not in served]
     if unserved:
         raise error(
             ["slots"],
             f"The callback {name} is mapped to slot {unserved[0]}, which no hardware worker serves; "
-            f"they serve {', '.join(map(str, served))}.",
+            f"they serve {', '.join(map(str, served)) or 'none'}.",
             "Raise `hardware_workers`.",
         )
     if callback.software and mapping.software_workers == 0:

@@ -151,7 +151,7 @@ MISTAKES = {
         6,
         "sobel is mapped to slot 3, which no hardware worker serves; they serve 2.",
     ),
-    "no hardware workers": ("hardware_workers = 0\n" + GOOD, 6, "0 hardware workers"),
+    "no hardware workers": ("hardware_workers = 0\n" + GOOD, 6, "no hardware worker serves; they serve none"),
 }
 
 
