@@ -4,28 +4,28 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from board_daemon.hosting import HostedBoard
 from reconros_zenoh.board.control import ControlServer, claim_name, status
 from reconros_zenoh.board.gateway_control import GatewayServer
 from reconros_zenoh.clock.process import begin_process
 from reconros_zenoh.clock.virtual import succeed_once
 from reconros_zenoh.measure.trace_file import traced_to
+from reconros_zenoh.project.hosting import HostedBoard
 from reconros_zenoh.transport.zenoh import ZenohTransport
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from board_daemon.hosting import BoardOptions
     from reconros_zenoh.board.profile import Profile
+    from reconros_zenoh.project.hosting import BoardOptions
     from reconros_zenoh.project.loader import Project
-    from reconros_zenoh.project.mapping_file import Mapping
+    from reconros_zenoh.project.mapping_file import ProjectMapping
 
 
 def run_board(
     router: str,
     profile: Profile,
     project: Project,
-    mapping: Mapping,
+    mapping: ProjectMapping,
     options: BoardOptions,
     on_ready: Callable[[], None],
     seconds: float | None = None,

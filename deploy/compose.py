@@ -15,7 +15,7 @@ from enum import StrEnum
 from graphlib import CycleError, TopologicalSorter
 from typing import TYPE_CHECKING
 
-from reconros_zenoh.yaml_node import Node
+from reconros_zenoh.yaml_node import YamlNode
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -33,7 +33,7 @@ _UNITS_NS = {"us": 10**3, "ms": 10**6, "s": 10**9, "m": 60 * 10**9, "h": 3600 * 
 _DURATION_PART = re.compile(r"([0-9]+(?:\.[0-9]+)?)(us|ms|s|m|h)")
 
 
-class Condition(StrEnum):
+class StartCondition(StrEnum):
     """What a service waits for before it starts."""
 
     STARTED = "service_started"
@@ -53,13 +53,13 @@ class Healthcheck:
 
 
 @dataclass(frozen=True, slots=True)
-class Service:
+class ComposeService:
     """One service: a command, and what must hold before it is started."""
 
     name: str
     command: tuple[str, ...]
     environment: Mapping[str, str] = field(default_factory=dict)
-    depends_on: Mapping[str, Condition] = field(default_factory=dict)
+    depends_on: Mapping[str, StartCondition] = field(default_factory=dict)
     healthcheck: Healthcheck | None = None
 
 
@@ -68,7 +68,7 @@ class Deployment:
     """The services of a Compose file, in the order of the file."""
 
     path: Path
-    services: dict[str, Service]
+    services: dict[str, ComposeService]
 
 
 def read_compose(path: Path, environment: Mapping[str, str]) -> Deployment:
@@ -77,7 +77,7 @@ def read_compose(path: Path, environment: Mapping[str, str]) -> Deployment:
     Every mistake raises FileError with the line: a key that is not supported, a wrong type, a dependency that
     is unknown or goes in a circle, a variable that is not set.
     """
-    root = Node.read(path, environment)
+    root = YamlNode.read(path, environment)
     entries = root.mapping()
     _check_keys(entries, _FILE_KEYS)
     if "services" not in entries:
@@ -98,7 +98,7 @@ def duration_ns(text: str) -> int | None:
     return int(sum(Decimal(number) * _UNITS_NS[unit] for number, unit in parts))
 
 
-def _service(name: str, node: Node) -> Service:
+def _service(name: str, node: YamlNode) -> ComposeService:
     if not _SERVICE_NAME.fullmatch(name):
         raise node.error("is no name for a service.", "Use letters, digits, `.`, `_` and `-`.")
     entries = node.mapping()
@@ -107,7 +107,7 @@ def _service(name: str, node: Node) -> Service:
         raise node.error("has no command.", "Add `command:`; locally no image supplies one.")
     healthcheck = entries.get("healthcheck")
     environment = entries.get("environment")
-    return Service(
+    return ComposeService(
         name=name,
         command=_command(entries["command"]),
         environment={} if environment is None else _environment(environment),
@@ -116,7 +116,7 @@ def _service(name: str, node: Node) -> Service:
     )
 
 
-def _check_keys(entries: Mapping[str, Node], known: Iterable[str]) -> None:
+def _check_keys(entries: Mapping[str, YamlNode], known: Iterable[str]) -> None:
     for key, node in entries.items():
         if key not in known and not key.startswith("x-"):
             raise node.error(
@@ -126,7 +126,7 @@ def _check_keys(entries: Mapping[str, Node], known: Iterable[str]) -> None:
             )
 
 
-def _command(node: Node) -> tuple[str, ...]:
+def _command(node: YamlNode) -> tuple[str, ...]:
     if isinstance(node.value, list):
         words = [item.text() for item in node.sequence()]
     else:
@@ -139,7 +139,7 @@ def _command(node: Node) -> tuple[str, ...]:
     return tuple(words)
 
 
-def _environment(node: Node) -> dict[str, str]:
+def _environment(node: YamlNode) -> dict[str, str]:
     """Return the variables of a service; one without a value is passed on if it is set, as in Compose."""
     if isinstance(node.value, list):
         split = [(item, *item.text().partition("=")) for item in node.sequence()]
@@ -156,7 +156,7 @@ def _environment(node: Node) -> dict[str, str]:
     return variables
 
 
-def _environment_value(node: Node) -> str | None:
+def _environment_value(node: YamlNode) -> str | None:
     if node.value is None:
         return None
     if isinstance(node.value, int | float) and not isinstance(node.value, bool):
@@ -164,28 +164,30 @@ def _environment_value(node: Node) -> str | None:
     return node.text()
 
 
-def _dependencies(service: Node) -> dict[str, tuple[Condition, Node]]:
+def _dependencies(service: YamlNode) -> dict[str, tuple[StartCondition, YamlNode]]:
     """Return what a service depends on: by name, the condition and the place where it is named."""
     node = service.mapping().get("depends_on")
     if node is None:
         return {}
     if isinstance(node.value, list):
-        return {item.text(): (Condition.STARTED, item) for item in node.sequence()}
+        return {item.text(): (StartCondition.STARTED, item) for item in node.sequence()}
     return {name: (_condition(item), item) for name, item in node.mapping().items()}
 
 
-def _condition(node: Node) -> Condition:
+def _condition(node: YamlNode) -> StartCondition:
     entries = node.mapping()
     _check_keys(entries, {"condition"})
     if "condition" not in entries:
-        raise node.error("has no condition.", f"Add `condition:` with one of {', '.join(Condition)}.")
+        raise node.error("has no condition.", f"Add `condition:` with one of {', '.join(StartCondition)}.")
     text = entries["condition"].text()
-    if text not in set(Condition):
-        raise entries["condition"].error(f"is unknown: {text!r}.", f"Take one of {', '.join(Condition)}.")
-    return Condition(text)
+    if text not in set(StartCondition):
+        raise entries["condition"].error(
+            f"is unknown: {text!r}.", f"Take one of {', '.join(StartCondition)}."
+        )
+    return StartCondition(text)
 
 
-def _healthcheck(node: Node) -> Healthcheck:
+def _healthcheck(node: YamlNode) -> Healthcheck:
     entries = node.mapping()
     _check_keys(entries, _HEALTHCHECK_KEYS)
     if "test" not in entries:
@@ -205,7 +207,7 @@ def _healthcheck(node: Node) -> Healthcheck:
     return Healthcheck(_test(entries["test"]), retries=retries, **durations)
 
 
-def _test(node: Node) -> tuple[str, ...]:
+def _test(node: YamlNode) -> tuple[str, ...]:
     if not isinstance(node.value, list):
         return _shell(node, node.text())
     match [item.text() for item in node.sequence()]:
@@ -218,13 +220,13 @@ def _test(node: Node) -> tuple[str, ...]:
     )
 
 
-def _shell(node: Node, line: str) -> tuple[str, ...]:
+def _shell(node: YamlNode, line: str) -> tuple[str, ...]:
     if not line.strip():
         raise node.error("is empty.", "Give the command that succeeds when the service is ready.")
     return ("/bin/sh", "-c", line)
 
 
-def _duration(node: Node, *, allow_zero: bool) -> int:
+def _duration(node: YamlNode, *, allow_zero: bool) -> int:
     text = node.text()
     value = duration_ns(text)
     if value is None:
@@ -236,27 +238,27 @@ def _duration(node: Node, *, allow_zero: bool) -> int:
     return value
 
 
-def _check_dependencies(node: Node, services: Mapping[str, Service]) -> None:
+def _check_dependencies(node: YamlNode, services: Mapping[str, ComposeService]) -> None:
     for name, (condition, place) in _dependencies(node).items():
         if name not in services:
             raise place.error(
                 f"names no service of this file: {name!r}.", f"Services are {', '.join(services)}."
             )
-        if condition is Condition.HEALTHY and services[name].healthcheck is None:
+        if condition is StartCondition.HEALTHY and services[name].healthcheck is None:
             raise place.error(
                 f"waits for {name} to be healthy, but {name} has no healthcheck.",
-                f"Give {name} a healthcheck, or wait for {Condition.STARTED}.",
+                f"Give {name} a healthcheck, or wait for {StartCondition.STARTED}.",
             )
 
 
-def _check_no_cycle(services: Mapping[str, Service], nodes: Mapping[str, Node]) -> None:
+def _check_no_cycle(services: Mapping[str, ComposeService], nodes: Mapping[str, YamlNode]) -> None:
     try:
         TopologicalSorter({name: service.depends_on for name, service in services.items()}).prepare()
     except CycleError as error:
         raise _cycle(error.args[1], nodes) from None
 
 
-def _cycle(circle: list[str], nodes: Mapping[str, Node]) -> FileError:
+def _cycle(circle: list[str], nodes: Mapping[str, YamlNode]) -> FileError:
     # graphlib lists each service after one that it must wait for; read backwards it says who waits for whom.
     names = list(reversed(circle))
     return nodes[names[0]].error(

@@ -9,7 +9,7 @@ from graphlib import TopologicalSorter
 from typing import TYPE_CHECKING, Self
 
 from deploy.child import local_environment
-from deploy.compose import Condition
+from deploy.compose import StartCondition
 from deploy.service_run import ServiceRun, ServiceState
 from deploy.signals import EndingSignals
 from reconros_zenoh.clock.alarm import Alarm
@@ -74,7 +74,7 @@ class LocalRunner:
             name
             for service in services.values()
             for name, condition in service.depends_on.items()
-            if condition is Condition.COMPLETED
+            if condition is StartCondition.COMPLETED
         }
 
     def __enter__(self) -> Self:

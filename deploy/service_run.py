@@ -11,7 +11,7 @@ from functools import partial
 from typing import TYPE_CHECKING, BinaryIO
 
 from deploy.child import Child
-from deploy.compose import Condition
+from deploy.compose import StartCondition
 from deploy.health import Health
 from deploy.logs import last_lines
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
     from pathlib import Path
 
-    from deploy.compose import Healthcheck, Service
+    from deploy.compose import ComposeService, Healthcheck
 
 _TAIL_LINES = 20
 
@@ -54,7 +54,7 @@ class ServiceRun:
 
     def __init__(
         self,
-        service: Service,
+        service: ComposeService,
         log: Path,
         environment: Mapping[str, str],
         post: Callable[[Callable[[], None]], None],
@@ -97,14 +97,14 @@ class ServiceRun:
             return self._health.next_check_ns
         return None if self._check.timed_out else self._check.deadline_ns
 
-    def meets(self, condition: Condition) -> bool:
+    def meets(self, condition: StartCondition) -> bool:
         """Whether a service that waits for this one under the condition may start."""
         match condition:
-            case Condition.STARTED:
+            case StartCondition.STARTED:
                 return self.state is not ServiceState.WAITING
-            case Condition.HEALTHY:
+            case StartCondition.HEALTHY:
                 return self._health is not None and self._health.healthy
-            case Condition.COMPLETED:
+            case StartCondition.COMPLETED:
                 return self.state is ServiceState.ENDED
 
     def start(self) -> None:

@@ -26,7 +26,7 @@ _RUNS, _STOPS = 0, 1
 
 
 @dataclass(frozen=True, slots=True)
-class Record:
+class DeploymentRecord:
     """What runs, the states in which its services were left, and what went wrong."""
 
     file: str
@@ -79,12 +79,12 @@ class StateFolder:
 
     def leave(self, states: Mapping[str, str], error: str) -> None:
         """Record how the owner, this process, leaves the deployment."""
-        record = Record(str(self._compose_file.resolve()), states, error)
+        record = DeploymentRecord(str(self._compose_file.resolve()), states, error)
         new = self._record.with_suffix(".new")
         new.write_text(json.dumps(asdict(record)), encoding="utf-8")
         new.replace(self._record)  # at once, so that nobody reads half a record
 
-    def end_owner(self) -> Record | None:
+    def end_owner(self) -> DeploymentRecord | None:
         """Stop the deployment if it is running; return its last record and forget it.
 
         None means that there is nothing to stop and nothing to tell. Raise UsageError when it runs elsewhere.
@@ -135,9 +135,9 @@ def _owner(lock: BinaryIO) -> int | None:
     return None if kind == fcntl.F_UNLCK else process
 
 
-def _read(record: Path) -> Record:
+def _read(record: Path) -> DeploymentRecord:
     try:
-        return Record(**json.loads(record.read_text(encoding="utf-8")))
+        return DeploymentRecord(**json.loads(record.read_text(encoding="utf-8")))
     except TypeError:
         raise FileError(
             record, None, "was written by another version of reconros.", "Use that one, or remove the file."

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from board_daemon.hosting import BoardOptions, HostedBoard
 from reconros_zenoh.board.actions import ActionClientSource, ActionSource
 from reconros_zenoh.board.board import Board, SlotPlan
 from reconros_zenoh.board.clients import ClientSource
@@ -19,6 +18,7 @@ from reconros_zenoh.board.sources import ServiceSource, SubscriptionSource, Time
 from reconros_zenoh.clock.virtual import VirtualEnvironment, succeed_once
 from reconros_zenoh.errors import UsageError
 from reconros_zenoh.measure.trace_plots import trace_figure
+from reconros_zenoh.project.hosting import BoardOptions, HostedBoard
 from reconros_zenoh.project.loader import load_project
 from reconros_zenoh.rmw.node import Context
 from reconros_zenoh.ros.graph import EndpointKind, EndpointToken, parse, tokens_expression

@@ -59,7 +59,7 @@ class _Constructor(RoundTripConstructor):
 
 
 @dataclass(frozen=True, slots=True)
-class Node:
+class YamlNode:
     """One value of a YAML file.
 
     `name` is its path of keys (`services.router.command`), `line` counts from 1, and `environment` gives the
@@ -73,7 +73,7 @@ class Node:
     environment: Mapping[str, str]
 
     @classmethod
-    def read(cls, path: Path, environment: Mapping[str, str]) -> Node:
+    def read(cls, path: Path, environment: Mapping[str, str]) -> YamlNode:
         """Return the whole file; raise FileError when it cannot be read or is not YAML."""
         text = read_text_file(path, "Give a readable YAML file.")
         yaml = YAML(typ="rt")
@@ -109,7 +109,7 @@ class Node:
         """Return the error that names this value, to be raised."""
         return FileError(self.path, self.line, f"{self.name} {problem}", remedy)
 
-    def mapping(self) -> dict[str, Node]:
+    def mapping(self) -> dict[str, YamlNode]:
         """Return the values under their keys, in the order of the file."""
         if not isinstance(self.value, dict):
             raise self._wrong_type("a mapping (`key: value`)")
@@ -118,7 +118,7 @@ class Node:
             raise self.error(f"has the key {wrong!r}, which is not a string.", "Put it in quotes.")
         return {key: self._member(key, key) for key in self.value}
 
-    def sequence(self) -> list[Node]:
+    def sequence(self) -> list[YamlNode]:
         """Return the items of the list."""
         if not isinstance(self.value, list):
             raise self._wrong_type("a list")
@@ -145,7 +145,7 @@ class Node:
             return float(self.value)
         raise self._wrong_type("a number")
 
-    def _member(self, key: str | int, title: str) -> Node:
+    def _member(self, key: str | int, title: str) -> YamlNode:
         # A key that came through a merge (`<<: *anchor`) has no place of its own: its mapping gives the line.
         places = self.value.lc.data or {}
         line = places[key][0] + 1 if key in places else self.line

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field
 
 VERSION = 1
+"""Rises with each field that is added, changed or taken away after the first release: all are required."""
 
 # Names go to terminals, which obey what control characters say.
 _Text = Annotated[str, Field(pattern=r"^[^\x00-\x1f\x7f-\x9f]*$")]
@@ -91,7 +92,7 @@ class _Host(_Part):
 class StatusAnswer(_Part):
     """What `reconros/<board>/status` answers, see `board.control.status`."""
 
-    version: Literal[1]
+    version: int
     board: _Text
     profile: _Text
     domain: int
@@ -114,7 +115,7 @@ class GatewayAnswer(_Part):
     `refused` says why none was added, `warning` what is odd about the one that was.
     """
 
-    version: Literal[1]
+    version: int
     gateways: list[_Gateway]
     refused: str | None
     warning: str | None

@@ -13,7 +13,7 @@ from reconros_zenoh.board.address_space import PlacedMessage, UnmappedError
 from reconros_zenoh.board.delegate_calls import DelegateCalls
 from reconros_zenoh.board.host import measured
 from reconros_zenoh.board.noted_calls import noted
-from reconros_zenoh.board.timing import cycles_ns
+from reconros_zenoh.board.timing import Native, cycles_ns
 from reconros_zenoh.errors import PageFaultError
 from reconros_zenoh.ros.c_layout import is_number, number
 from reconros_zenoh.ros.message_arrays import arrays_of, lies_in
@@ -233,11 +233,11 @@ class HardwareThread(DelegateCalls):
     def compute(self, kernel: Callable[..., R], *arguments: object) -> Generator[Awaitable, object, R]:
         """Return `kernel(*arguments)` of a pure kernel when the slot has computed it."""
         host = self._board.host
-        if self._time.ns is None and self._time.modelled:
-            return (yield from self._compute_as_measured(kernel, *arguments))
+        if isinstance(self._time, Native):
+            return (yield from self._compute_as_measured(self._time.factor, kernel, *arguments))
         task = partial(host.compute, kernel, *arguments)
         future = host.start(self._next_step(), task, limit=self._limit)
-        if self._time.ns is None:
+        if self._time is None:
             result: R = yield from host.result(future)
             self._timeline.mark("execution")
             return result
@@ -250,7 +250,7 @@ class HardwareThread(DelegateCalls):
     @noted
     def compute_cycles(self, cycles: int) -> Generator[Awaitable, object, None]:
         """Return when so many cycles of the slot's clock have passed; at once where nothing is modelled."""
-        if self._time.modelled:
+        if self._time is not None:
             yield self._environment.timeout(cycles_ns(cycles, self._slot.clock_hz))
             self._timeline.mark("execution")
 
@@ -314,14 +314,14 @@ class HardwareThread(DelegateCalls):
             self._message.release()
 
     def _compute_as_measured(
-        self, kernel: Callable[..., R], *arguments: object
+        self, factor: float, kernel: Callable[..., R], *arguments: object
     ) -> Generator[Awaitable, object, R]:
         host, started_ns = self._board.host, self._environment.now
         task = partial(host.compute, measured, kernel, *arguments)
         future = host.start(self._next_step(), task, limit=self._limit)
         result: R
         result, took_ns = yield from host.result(future)
-        yield from host.until(started_ns + round(took_ns * self._time.factor))
+        yield from host.until(started_ns + round(took_ns * factor))
         self._timeline.mark("execution")
         return result
 

@@ -244,7 +244,8 @@ def ask(
         answer: dict[str, Any] = msgpack.unpackb(reply.payload)
         if isinstance(answer, dict) and answer.get("version") != VERSION:
             raise TransportError(
-                f"board {board!r} speaks version {answer.get('version')} of the {what}, not {VERSION}."
+                f"board {board!r} speaks version {answer.get('version')} of the {what}, not {VERSION}. "
+                "Ask it with the reconros that it was started with."
             )
         form.model_validate(answer)
     except ValidationError as error:
@@ -258,5 +259,5 @@ def ask(
 def _no_answer(board: str, what: str, problem: str) -> TransportError:
     return TransportError(
         f"what calls itself board {board!r} answers with what is no {what} ({problem}). "
-        "Find out what runs there."
+        "Find out what runs there, and of which version of reconros it is."
     )

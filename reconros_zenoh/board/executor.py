@@ -17,7 +17,7 @@ from reconros_zenoh.board.failures import Failures
 from reconros_zenoh.board.hmt import HmtSource
 from reconros_zenoh.board.host import Limit
 from reconros_zenoh.board.software import SoftwareImplementation, is_plain
-from reconros_zenoh.board.timing import hardware_time, software_time
+from reconros_zenoh.board.timing import describe, hardware_time, software_time
 from reconros_zenoh.board.workers import HardwareWorker, SoftwareWorker
 from reconros_zenoh.errors import BadMessageError, UsageError
 from reconros_zenoh.executor.callbacks import CallbackEntry, CallbackKind
@@ -54,9 +54,9 @@ class _Registration:
         """Return what the time of the callback rests on in each place where it may run."""
         places: dict[str, object] = {}
         if self.software is not None:
-            places["software"] = self.software.time.describe()
+            places["software"] = describe(self.software.time)
         for _, time, _ in self.slots.values():
-            places["hardware"] = time.describe()
+            places["hardware"] = describe(time)
         return places
 
 

@@ -24,9 +24,7 @@ class Memif:
         self._modelled = bytes_per_ns is not None
         bandwidth = bytes_per_ns or 1
         self.bus = SharedResource(environment, capacity=bandwidth, per_job=bandwidth)
-        self.transferred_bytes = 0
 
     def transfer(self, size: int) -> Generator[Awaitable, object, None]:
         """Return when `size` bytes have gone from or to the main memory."""
-        self.transferred_bytes += size
         return self.bus.serve(size if self._modelled else 0)

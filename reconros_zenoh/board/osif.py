@@ -20,9 +20,7 @@ class Osif:
     def __init__(self, cpu: Cpu, call_ns: int) -> None:
         self._cpu = cpu
         self._call_ns = call_ns
-        self.calls = 0
 
     def call(self) -> Generator[Awaitable, object, None]:
         """Return when the delegate has carried out one call."""
-        self.calls += 1
         return self._cpu.run(self._call_ns)

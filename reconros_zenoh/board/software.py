@@ -8,6 +8,7 @@ from functools import partial
 from inspect import isasyncgenfunction, iscoroutinefunction, isgeneratorfunction
 from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 
+from reconros_zenoh.board.timing import Native
 from reconros_zenoh.errors import CallbackError
 
 if TYPE_CHECKING:
@@ -62,7 +63,7 @@ class SoftwareContext:
         self.started_ns = board.environment.now
         self.sequence_number = sequence_number
         # What is measured is really computed each time.
-        self._really = time.ns is None and time.modelled
+        self._really = isinstance(time, Native)
         self._mutexes: dict[Mutex, None] = {}
         self._is_over = False
         self.sends: list[Callable[[Timeline], object]] = []

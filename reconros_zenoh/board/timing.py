@@ -39,41 +39,33 @@ Timing: TypeAlias = Cycles | Native
 
 
 @dataclass(frozen=True, slots=True)
-class ExecutionTime:
-    """How long one callback computes in one place, and what that rests on.
+class FixedTime:
+    """The callback computes for `ns` each time, as the profile's table or the declared cycles say."""
 
-    `ns` is None where the host is measured: then it takes `factor` times as long as that. Without a model
-    (`modelled` False) it takes as long as it takes.
-    """
+    basis: Literal["table", "cycles"]
+    ns: int
 
-    basis: Literal["table", "cycles", "native"]
-    ns: int | None = None
-    factor: float = 1.0
-    modelled: bool = True
 
-    def describe(self) -> dict[str, Any]:
-        """Return the basis and what goes with it, for status and reports."""
-        if self.ns is None:
-            return {"basis": self.basis, "factor": self.factor}
-        return {"basis": self.basis, "ms": self.ns / 1e6}
+ExecutionTime: TypeAlias = FixedTime | Native | None
+"""How long one callback computes in one place; None where nothing is modelled: as long as it takes."""
 
 
 def software_time(profile: Profile, callback: str, timing: Timing | None) -> ExecutionTime:
     """Return the core time of the callback; raise UsageError when nothing says how long it takes."""
     if profile.model is None:
-        return _NOT_MODELLED
+        return None
     if timing is not None:
         return _declared(timing, profile.model.cores.clock.hz)
-    return ExecutionTime("table", _table(profile, callback, "software").software.ns)
+    return FixedTime("table", _table(profile, callback, "software").software.ns)
 
 
 def hardware_time(profile: Profile, callback: str, timing: Timing | None, clock_hz: float) -> ExecutionTime:
     """Return how long a slot with this clock computes; raise UsageError when nothing says it."""
     if profile.model is None:
-        return _NOT_MODELLED
+        return None
     if timing is not None:
         return _declared(timing, clock_hz)
-    return ExecutionTime("table", _table(profile, callback, "hardware").compute.ns)
+    return FixedTime("table", _table(profile, callback, "hardware").compute.ns)
 
 
 def cycles_ns(count: int, clock_hz: float) -> int:
@@ -81,13 +73,15 @@ def cycles_ns(count: int, clock_hz: float) -> int:
     return round(count * _SECOND_NS / clock_hz)
 
 
-_NOT_MODELLED = ExecutionTime("native", modelled=False)
+def describe(time: ExecutionTime) -> dict[str, Any]:
+    """Return what the time rests on, and what goes with it, for status and reports."""
+    if isinstance(time, FixedTime):
+        return {"basis": time.basis, "ms": time.ns / 1e6}
+    return {"basis": "native", "factor": time.factor if time else 1.0}
 
 
 def _declared(timing: Timing, clock_hz: float) -> ExecutionTime:
-    if isinstance(timing, Cycles):
-        return ExecutionTime("cycles", cycles_ns(timing.count, clock_hz))
-    return ExecutionTime("native", factor=timing.factor)
+    return FixedTime("cycles", cycles_ns(timing.count, clock_hz)) if isinstance(timing, Cycles) else timing
 
 
 def _table(profile: Profile, callback: str, side: str) -> CallbackSection:

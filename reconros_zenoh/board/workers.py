@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, cast
 from reconros_zenoh.board.callback import HardwareThread, ThreadExit
 from reconros_zenoh.board.host import measured
 from reconros_zenoh.board.software import SoftwareContext
+from reconros_zenoh.board.timing import FixedTime
 from reconros_zenoh.clock.activity import PARK, Activity, Signal, limited
 from reconros_zenoh.errors import CallbackError
 from reconros_zenoh.executor.callbacks import CallbackKind
@@ -136,13 +137,13 @@ class SoftwareWorker(Worker):
         board, timeline, time = self._board, event.timeline, implementation.time
         function, limit, host = implementation.function, implementation.limit, self._board.host
         task = None if event.lasting else name
-        if time.ns is not None:
+        if isinstance(time, FixedTime):
             future = host.start(task, function, event.message, context, limit=limit)
             yield from board.cpu.run(time.ns)
             timeline.mark("execution")
             response = yield from host.late_result(future)
             timeline.mark("overrun")
-        elif not time.modelled:
+        elif time is None:
             response = yield from host.result(host.start(task, function, event.message, context, limit=limit))
             timeline.mark("execution")
         else:

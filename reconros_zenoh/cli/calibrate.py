@@ -10,7 +10,7 @@ import typer
 from rich.text import Text
 
 from reconros_zenoh.board.profile import profile_path, read_profile
-from reconros_zenoh.cli.console import interrupted, titled_table, wide_console
+from reconros_zenoh.cli.console import interrupted, new_table, wide_console
 from reconros_zenoh.cli.options import AsJson, Seed
 from reconros_zenoh.cli.progress import run_bar
 from reconros_zenoh.errors import UsageError
@@ -150,11 +150,12 @@ def _object(found: Calibration, out: Path, requests: int, seed: int) -> dict[str
 
 
 def _print(console: Console, found: Calibration) -> None:
-    cells = titled_table("Medians in ms, and the errors of p25, median and p75 after the fit", 1)
-    for column in ("mapping", "client", "measured", "before", "after", "p25", "median", "p75"):
-        cells.add_column(
-            column, overflow="fold", justify="left" if column in {"mapping", "client"} else "right"
-        )
+    cells = new_table(
+        ("mapping", "client"),
+        ("measured", "before", "after", "p25", "median", "p75"),
+        title="Medians in ms, and the errors of p25, median and p75 after the fit",
+        padding=1,
+    )
     for cell in found.cells:
         cells.add_row(
             Text(cell.mapping),
@@ -163,9 +164,9 @@ def _print(console: Console, found: Calibration) -> None:
             *_errors(cell),
         )
     console.print(cells)
-    constants = titled_table("Constants, and how much the objective changes when one is 20 % more or less")
-    for column in ("constant", "unit", "old", "new", "sensitivity", ""):
-        constants.add_column(column, justify="left" if column in {"constant", "unit", ""} else "right")
+    title = "Constants, and how much the objective changes when one is 20 % more or less"
+    constants = new_table(("constant", "unit"), ("old", "new", "sensitivity"), title=title)
+    constants.add_column("")
     for each in found.constants:
         constants.add_row(
             each.constant.name,

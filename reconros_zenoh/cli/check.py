@@ -8,11 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.box import SIMPLE_HEAD
-from rich.table import Table
-from rich.text import Text
 
-from reconros_zenoh.cli.console import PlainConsole
+from reconros_zenoh.cli.console import PlainConsole, print_rows
 from reconros_zenoh.cli.options import AsJson
 from reconros_zenoh.project.build_cfg import read_build_cfg
 from reconros_zenoh.project.communication import check_topics
@@ -20,8 +17,6 @@ from reconros_zenoh.project.loader import read_project
 from reconros_zenoh.project.resources import slot_resources
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
-
     from reconros_zenoh.project.build_cfg import BuildConfiguration
     from reconros_zenoh.project.slots import HwSlot
 
@@ -139,26 +134,26 @@ def _print(console: PlainConsole, configuration: BuildConfiguration) -> None:
     }
     console.print(configuration.name, style="bold")
     console.print(", ".join(f"{name} {fact}" for name, fact in facts.items() if fact))
+    console.print()
     names = {slot.id: slot.name for slot in configuration.slots}
-    _table(
+    print_rows(
         console,
-        "clocks",
         ("name", "source", "Hz"),
         ((clock.name, clock.source, clock.hz) for clock in configuration.clocks),
+        title="clocks",
     )
     slots = map(_slot, configuration.slots)
-    _table(
+    print_rows(
         console,
-        "slots",
         ("id", "name", "clock", "reconfigurable", "LUT", "DSP", "BRAM36", "BRAM18"),
         (
             ["yes" if value is True else "no" if value is False else value for value in slot.values()]
             for slot in slots
         ),
+        title="slots",
     )
-    _table(
+    print_rows(
         console,
-        "threads",
         ("name", "slots", "hardware", "software", "resource groups"),
         (
             (
@@ -170,11 +165,11 @@ def _print(console: PlainConsole, configuration: BuildConfiguration) -> None:
             )
             for thread in configuration.threads
         ),
+        title="threads",
     )
     _print_resources(console, configuration)
-    _table(
+    print_rows(
         console,
-        "gateways",
         ("name", "slots", "hardware-mapped", "software-mapped", "type", "QoS"),
         (
             (
@@ -187,17 +182,17 @@ def _print(console: PlainConsole, configuration: BuildConfiguration) -> None:
             )
             for gateway in configuration.gateways
         ),
+        title="gateways",
     )
 
 
 def _print_resources(console: PlainConsole, configuration: BuildConfiguration) -> None:
     resources = configuration.resources
     nodes = (resource for resource in resources if resource.type == "rosnode")
-    _table(console, "nodes", ("node", "group"), ((node.ros_name, node.group) for node in nodes))
+    print_rows(console, ("node", "group"), ((node.ros_name, node.group) for node in nodes), title="nodes")
     for title, types in _ENDPOINTS.items():
-        _table(
+        print_rows(
             console,
-            title,
             (title.removesuffix("s"), "", "node", "type", "group"),
             (
                 (
@@ -210,28 +205,12 @@ def _print_resources(console: PlainConsole, configuration: BuildConfiguration) -
                 for resource in resources
                 if resource.type in types
             ),
+            title=title,
         )
     timers = (resource for resource in resources if resource.type == "rostmr")
-    _table(
+    print_rows(
         console,
-        "timers",
         ("timer", "period [ms]", "node", "group"),
         ((timer.name, timer.number, timer.node, timer.group) for timer in timers),
+        title="timers",
     )
-
-
-def _table(
-    console: PlainConsole, title: str, columns: Iterable[str], rows: Iterable[Iterable[object]]
-) -> None:
-    """Print a table unless it has no rows; numbers stand to the right."""
-    content = [list(row) for row in rows]
-    if not content:
-        return
-    table = Table(title=Text(title, style="bold"), title_justify="left", box=SIMPLE_HEAD, show_edge=False)
-    for index, column in enumerate(columns):
-        numbers = all(isinstance(row[index], int) for row in content)
-        table.add_column(Text(column), justify="right" if numbers else "left", overflow="fold")
-    for row in content:
-        table.add_row(*(Text("-" if value in {None, ""} else str(value)) for value in row))
-    console.print()
-    console.print(table)

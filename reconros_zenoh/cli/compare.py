@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.text import Text
 
-from board_daemon.hosting import BoardOptions
-from reconros_zenoh.cli.console import interrupted, titled_table, wide_console
+from reconros_zenoh.cli.console import interrupted, new_table, wide_console
 from reconros_zenoh.cli.options import AsJson, ModelSeed, ProjectProfile, project_prints
 from reconros_zenoh.cli.progress import run_bar
 from reconros_zenoh.cli.status_screen import SHARED_PARTS
@@ -23,6 +22,7 @@ from reconros_zenoh.experiments.stimulus import Stimulus, bag_topics, read_input
 from reconros_zenoh.measure.mapping_plots import ages_figure
 from reconros_zenoh.measure.plots import write_figure
 from reconros_zenoh.measure.statistics import format_ms, format_share
+from reconros_zenoh.project.hosting import BoardOptions
 from reconros_zenoh.project.loader import load_project
 from reconros_zenoh.project.main_file import load_main
 
@@ -149,27 +149,22 @@ def _draw(path: Path, runs: Mapping[str, MappingRun]) -> bool:
 def _print(console: Console, experiment: Mapping[str, Any]) -> None:
     mappings = experiment["mappings"]
     title = f"{experiment['project']} on {experiment['profile']}, {experiment['seconds']:g} s: ages in ms"
-    ages = titled_table(title, 1)
-    ages.add_column("publishes", overflow="fold")
-    ages.add_column("mapping", overflow="fold")
-    for column in ("per s", "median", "p95", "p99", "max"):
-        ages.add_column(column, justify="right", no_wrap=True)
+    figures = ("per s", "median", "p95", "p99", "max")
+    ages = new_table(("publishes", "mapping"), figures, title=title, padding=1)
     for topic in next(iter(mappings.values()))["outputs"]:
         outputs = {name: measured["outputs"][topic] for name, measured in mappings.items()}
         if any(output["sent"] for output in outputs.values()):
             for name, output in outputs.items():
-                figures = (format_ms(output[f"{figure}_ms"]) for figure in ("median", "p95", "p99", "max"))
-                ages.add_row(Text(topic), Text(name), f"{output['rate_hz']:.4g}", *figures)
+                times = (format_ms(output[f"{figure}_ms"]) for figure in figures[1:])
+                ages.add_row(Text(topic), Text(name), f"{output['rate_hz']:.4g}", *times)
             ages.add_section()
     if ages.row_count:
         console.print(ages)
         told = "age: since the message or timer that it follows from, until it is over the link"
         console.print(told, style="dim")
         console.print()
-    boards = titled_table("what became of the messages, and of the slots", 1)
-    boards.add_column("mapping", overflow="fold")
-    for column in ("lost", "refused", "failed", "swaps"):
-        boards.add_column(column, justify="right", no_wrap=True)
+    title = "what became of the messages, and of the slots"
+    boards = new_table(("mapping",), ("lost", "refused", "failed", "swaps"), title=title, padding=1)
     boards.add_column("busiest")
     for name, measured in mappings.items():
         counts = (str(measured[key]) for key in ("dropped", "refused", "failed", "reconfigurations"))

@@ -44,15 +44,57 @@ def wide_console(columns: int = _COLUMNS) -> PlainConsole:
     return console
 
 
-def titled_table(title: str, padding: int = 0) -> Table:
-    """Return a table without columns under its title, with so many blanks behind each column."""
-    return Table(
-        title=Text(title, style="bold"),
+def new_table(
+    names: Iterable[str] = (), figures: Iterable[str] = (), *, title: str = "", padding: int = 0
+) -> Table:
+    """Return a table without rows: columns of names, folded if need be, then of figures, which never are.
+
+    `padding` is the number of blanks behind each column.
+    """
+    table = Table(
+        title=Text(title, style="bold") if title else None,
         title_justify="left",
         box=SIMPLE_HEAD,
         padding=(0, padding, 0, 0),
         show_edge=False,
     )
+    # As text: a unit in brackets is no markup.
+    for name in names:
+        table.add_column(Text(name), overflow="fold")
+    for figure in figures:
+        table.add_column(Text(figure), justify="right", no_wrap=True)
+    return table
+
+
+def print_rows(
+    console: Console, columns: Iterable[str], rows: Iterable[Iterable[object]], *, title: str = ""
+) -> None:
+    """Print a table and an empty line unless there are no rows.
+
+    Columns of numbers stand to the right; numbers with a fraction are ms, and what is not there is a `-`.
+    """
+    content = [list(row) for row in rows]
+    if not content:
+        return
+    table = new_table(title=title, padding=1)
+    for index, column in enumerate(columns):
+        numbers = all(isinstance(row[index], int | float | None) for row in content)
+        table.add_column(Text(column), justify="right" if numbers else "left", overflow="fold")
+    for row in content:
+        table.add_row(*(Text(_cell(value)) for value in row))
+    console.print(table, highlight=False)
+    console.print()
+
+
+def _cell(value: object) -> str:
+    if value is None or value == "":
+        return "-"
+    return short_ms(value) if isinstance(value, float) else str(value)
+
+
+def short_ms(value: float) -> str:
+    """Return a time in ms with about three digits."""
+    return f"{value:.3g}" if value < 1000 else f"{value:.0f}"
 
 
 def interrupted(*, quiet: bool, measured: bool = True) -> typer.Exit:

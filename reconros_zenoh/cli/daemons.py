@@ -87,7 +87,7 @@ def board(
 ) -> None:
     """Run an emulated board that hosts a project, until Ctrl-C."""
     from board_daemon.daemon import run_board
-    from board_daemon.hosting import BoardOptions
+    from reconros_zenoh.project.hosting import BoardOptions
     from reconros_zenoh.project.loader import load_project
 
     loaded = load_project(project or application_folder())

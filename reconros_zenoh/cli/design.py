@@ -7,12 +7,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.box import SIMPLE_HEAD
-from rich.table import Table
 from rich.text import Text
 
 from reconros_zenoh.board.profile import read_profile
-from reconros_zenoh.cli.console import PlainConsole, interrupted, wide_console
+from reconros_zenoh.cli.console import PlainConsole, interrupted, new_table, wide_console
 from reconros_zenoh.cli.options import AsJson, ClockName, Out, Profile, Seed
 from reconros_zenoh.cli.progress import run_bar
 from reconros_zenoh.errors import UsageError
@@ -110,10 +108,7 @@ def design(
 
 
 def _print_table(console: PlainConsole, variants: Mapping[str, Mapping[str, Any]]) -> None:
-    table = Table(box=SIMPLE_HEAD, padding=0, show_edge=False)
-    table.add_column("")
-    for variant in variants:
-        table.add_column(variant, justify="right", no_wrap=True)
+    table = new_table(("",), variants)
     for key, text in _ROWS.items():
         cells = (variant[key] for variant in variants.values())
         table.add_row(text, *(_cell(cell, key) for cell in cells))

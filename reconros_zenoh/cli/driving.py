@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.text import Text
 
-from reconros_zenoh.cli.console import interrupted, titled_table, wide_console
+from reconros_zenoh.cli.console import interrupted, new_table, wide_console
 from reconros_zenoh.cli.options import AsJson, Out, Profile
 from reconros_zenoh.cli.progress import run_bar
 from reconros_zenoh.experiments.provenance import own_folder, write_experiment, writing
@@ -108,10 +108,8 @@ def _draw(path: Path, experiment: dict[str, Any], drives: dict[str, Drive]) -> N
 
 
 def _print(console: Console, experiment: dict[str, Any], troubles: list[str]) -> None:
-    table = titled_table("the chain from Image Compensation to Lane Control: means in ms", 1)
-    table.add_column("")
-    for variant in experiment["variants"]:
-        table.add_column(variant, justify="right", no_wrap=True)
+    title = "the chain from Image Compensation to Lane Control: means in ms"
+    table = new_table(("",), experiment["variants"], title=title, padding=1)
     variants = experiment["variants"].values()
     for section in next(iter(variants))["sections_ms"]:
         table.add_row(section, *(format_ms(variant["sections_ms"][section]) for variant in variants))

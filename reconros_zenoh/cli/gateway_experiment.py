@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import json
-from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.text import Text
 
-from reconros_zenoh.cli.console import interrupted, titled_table, wide_console
+from reconros_zenoh.cli.console import interrupted, new_table, wide_console
 from reconros_zenoh.cli.options import AsJson, ClockName, Out, Profile
 from reconros_zenoh.cli.progress import run_bar
 from reconros_zenoh.errors import UsageError
 from reconros_zenoh.experiments.provenance import own_folder, writing
+from reconros_zenoh.mapping.graph import Side
 from reconros_zenoh.measure.findings import host_troubles
 
 if TYPE_CHECKING:
@@ -30,16 +30,9 @@ _RESULT = "gateway.json"
 _FIGURES = {"hardware": "fig6_hardware_publisher.png", "software": "fig7_software_publisher.png"}
 
 
-class PublisherName(StrEnum):
-    """Where the publisher runs."""
-
-    HARDWARE = "hardware"
-    SOFTWARE = "software"
-
-
 def gateway(
     publisher: Annotated[
-        PublisherName | None, typer.Option(help="Where the publisher runs.", show_default="both")
+        Side | None, typer.Option(help="Where the publisher runs.", show_default="both")
     ] = None,
     clock: Annotated[
         ClockName | None, typer.Option(help="Real time, or virtual time.", show_default="virtual")
@@ -58,17 +51,17 @@ def gateway(
     real processes, publisher and subscriber in software.
     """
     from reconros_zenoh.board.profile import read_profile
-    from reconros_zenoh.experiments.gateway import PUBLISHERS, measure_gateway
+    from reconros_zenoh.experiments.gateway import measure_gateway
     from reconros_zenoh.experiments.gateway_native import measure_native
 
     byte_counts, counts = _sizes(sizes), _counts(subscribers)
     board = read_profile(profile)
     time: Clock = "wall" if clock is ClockName.WALL else "virtual"
-    publishers = [name for name in PUBLISHERS if publisher is None or name == publisher.value]
+    publishers = list(Side) if publisher is None else [publisher]
     if board.model is None:
-        if clock is ClockName.VIRTUAL or publisher is PublisherName.HARDWARE:
+        if clock is ClockName.VIRTUAL or publisher is Side.HARDWARE:
             raise UsageError("profile native runs in real time, with the publisher in software.")
-        publishers = ["software"]
+        publishers = [Side.SOFTWARE]
     with own_folder(out):
         _prepare(out)
         with run_bar("cells", len(publishers) * len(byte_counts) * len(counts), quiet=as_json) as advance:
@@ -110,7 +103,7 @@ def _write(out: Path, result: dict[str, Any]) -> list[Path]:
 
 def _print(console: Console, result: dict[str, Any]) -> None:
     for publisher in dict.fromkeys(cell["publisher"] for cell in result["cells"]):
-        table = titled_table(f"from {publisher}: ms to the slowest subscriber in HW, and in SW", 1)
+        table = new_table(title=f"from {publisher}: ms to the slowest subscriber in HW, and in SW", padding=1)
         for column in ("kB", "subscribers", *_to("HW"), *_to("SW")):
             table.add_column(column, justify="right", vertical="bottom", no_wrap=True)
         for cell in result["cells"]:

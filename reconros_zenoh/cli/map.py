@@ -9,12 +9,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
-from rich.box import SIMPLE_HEAD
-from rich.table import Table
 from rich.text import Text
 
 from reconros_zenoh.board.profile import read_profile
-from reconros_zenoh.cli.console import wide_console
+from reconros_zenoh.cli.console import new_table, wide_console
 from reconros_zenoh.cli.options import ENDPOINT, AsJson, Domain, MappingName, Router
 from reconros_zenoh.cli.printable import printable
 from reconros_zenoh.errors import UsageError
@@ -32,14 +30,14 @@ if TYPE_CHECKING:
     from reconros_zenoh.mapping.communication import TopicMapping
     from reconros_zenoh.mapping.graph import ComputationGraph, Edge
     from reconros_zenoh.project.loader import ProjectFiles
-    from reconros_zenoh.project.mapping_file import Mapping as NodeMapping
+    from reconros_zenoh.project.mapping_file import ProjectMapping
 
 
 class _MappedProject(NamedTuple):
     """A project, and which of its callbacks runs where."""
 
     files: ProjectFiles
-    mapping: NodeMapping
+    mapping: ProjectMapping
 
 
 def map_communication(
@@ -156,7 +154,7 @@ def _read_live(router: str, domain: int, hardware: list[str], source: Path | Non
 
 
 def _print(console: Console, result: Mapping[str, Any], crossings: Crossings) -> None:
-    table = _table("topic", "mapping", "publishers", "subscribers", "reason")
+    table = new_table(("topic", "mapping", "publishers", "subscribers", "reason"), padding=1)
     for topic in result["topics"]:
         table.add_row(
             Text(topic["name"]),
@@ -181,7 +179,8 @@ def _print(console: Console, result: Mapping[str, Any], crossings: Crossings) ->
 def _print_predictions(console: Console, result: Mapping[str, Any]) -> None:
     predicted = result["predicted"]
     console.print(f"\nBy the transfer times of {predicted['model']}:", style="bold", highlight=False)
-    table = _table("topic", "rule", "predicted", "SMT HW/SW", "gateway HW/SW", "changeover", "reason")
+    columns = ("topic", "rule", "predicted", "SMT HW/SW", "gateway HW/SW", "changeover", "reason")
+    table = new_table(columns, padding=1)
     for topic in result["topics"]:
         prediction = topic["predicted"]
         other = prediction["mapping"] != topic["mapping"]
@@ -236,10 +235,3 @@ def _times(forecast: Mapping[str, float | None] | None) -> str:
     return " / ".join(
         "-" if forecast[key] is None else f"{forecast[key]:.3f}" for key in ("hw_max_ms", "sw_ms")
     )
-
-
-def _table(*columns: str) -> Table:
-    table = Table(box=SIMPLE_HEAD, padding=(0, 1, 0, 0), show_edge=False)
-    for column in columns:
-        table.add_column(column, overflow="fold")
-    return table

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from board_daemon.hosting import BoardOptions
 from reconros_zenoh.board.control import status
 from reconros_zenoh.cli.console import interrupted, wide_console
 from reconros_zenoh.cli.options import (
@@ -27,12 +26,13 @@ from reconros_zenoh.cli.options import (
     project_prints,
 )
 from reconros_zenoh.cli.status_screen import print_status
+from reconros_zenoh.project.hosting import BoardOptions
 from reconros_zenoh.project.loader import load_project
 
 if TYPE_CHECKING:
     from reconros_zenoh.board.profile import Profile
     from reconros_zenoh.project.loader import Project
-    from reconros_zenoh.project.mapping_file import Mapping
+    from reconros_zenoh.project.mapping_file import ProjectMapping
 
 _VIRTUAL_S = 10.0
 
@@ -98,7 +98,7 @@ def run(
 
 
 def _run_virtual(
-    profile: Profile, project: Project, mapping: Mapping, options: BoardOptions, seconds: float
+    profile: Profile, project: Project, mapping: ProjectMapping, options: BoardOptions, seconds: float
 ) -> dict[str, Any]:
     """Return the status of the board after so many seconds of virtual time, or at Ctrl-C."""
     from reconros_zenoh.experiments.simulation import Simulation

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 from typer.main import get_command
 
-from board_daemon.hosting import BoardOptions
-from deploy.compose import Condition, read_compose
+from deploy.compose import StartCondition, read_compose
 from host_clients.camera import CameraOptions
 from host_clients.daemon import ClientOptions
 from host_clients.desktop import ViewerOptions
@@ -20,13 +19,14 @@ from reconros_zenoh.cli import daemons, desktop
 from reconros_zenoh.errors import FileError, UsageError
 from reconros_zenoh.experiments.deployment import BoardPlan, DeploymentPlan
 from reconros_zenoh.experiments.roundtrip import application_folder
+from reconros_zenoh.project.hosting import BoardOptions
 from reconros_zenoh.project.loader import load_project
-from reconros_zenoh.yaml_node import Node
+from reconros_zenoh.yaml_node import YamlNode
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
-    from deploy.compose import Service
+    from deploy.compose import ComposeService
     from reconros_zenoh.project.loader import Project
 
 _VERBS: dict[str, Callable[..., None]] = {
@@ -48,7 +48,7 @@ def read_deployment(path: Path, environment: Mapping[str, str], *, has_end: bool
     unless it `has_end` anyway, no client, camera or robot.
     """
     services = read_compose(path, environment).services
-    nodes = Node.read(path, environment).mapping()["services"].mapping()
+    nodes = YamlNode.read(path, environment).mapping()["services"].mapping()
     projects = functools.cache(load_project)
     boards: dict[str, BoardPlan] = {}
     clients: dict[str, ClientOptions] = {}
@@ -57,7 +57,7 @@ def read_deployment(path: Path, environment: Mapping[str, str], *, has_end: bool
     robots: dict[str, RobotOptions] = {}
     for name, service in services.items():
         command = nodes[name].mapping()["command"]
-        if Condition.COMPLETED in service.depends_on.values():
+        if StartCondition.COMPLETED in service.depends_on.values():
             raise nodes[name].error(
                 "waits for the end of another service, which `simulate` does not know.",
                 "Simulate the services that run side by side in a file of their own.",
@@ -102,7 +102,9 @@ def read_deployment(path: Path, environment: Mapping[str, str], *, has_end: bool
     return plan
 
 
-def _board_plan(given: Mapping[str, Any], command: Node, projects: Callable[[Path], Project]) -> BoardPlan:
+def _board_plan(
+    given: Mapping[str, Any], command: YamlNode, projects: Callable[[Path], Project]
+) -> BoardPlan:
     """Return what the options of `reconros board` ask for."""
     try:
         project = projects(given["project"] or application_folder())
@@ -122,7 +124,7 @@ def _board_plan(given: Mapping[str, Any], command: Node, projects: Callable[[Pat
     return BoardPlan(profile, project, mapping, options)
 
 
-def _parse(service: Service, command: Node) -> tuple[str, dict[str, Any]]:
+def _parse(service: ComposeService, command: YamlNode) -> tuple[str, dict[str, Any]]:
     """Return the verb of the service's command and the values of its options."""
     program, *words = service.command
     if PurePath(program).name != "reconros" or not words or words[0] not in _VERBS:
@@ -160,7 +162,7 @@ def _parser(verb: str) -> Any:
     return get_command(application)
 
 
-def _check_clients(plan: DeploymentPlan, nodes: Mapping[str, Node]) -> None:
+def _check_clients(plan: DeploymentPlan, nodes: Mapping[str, YamlNode]) -> None:
     """Raise FileError for a client, camera or robot that could never begin."""
     domains = {name: client.domain for name, client in plan.clients.items()}
     domains |= {name: camera.domain for name, camera in plan.cameras.items()}
@@ -190,7 +192,7 @@ def _check_clients(plan: DeploymentPlan, nodes: Mapping[str, Node]) -> None:
             )
 
 
-def _check_end(plan: DeploymentPlan, nodes: Mapping[str, Node], *, has_end: bool) -> None:
+def _check_end(plan: DeploymentPlan, nodes: Mapping[str, YamlNode], *, has_end: bool) -> None:
     """Raise FileError when nothing would ever happen, or it would never end."""
     first = next(iter(nodes.values()))
     if not plan.boards:

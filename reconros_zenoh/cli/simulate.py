@@ -8,11 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.box import SIMPLE_HEAD
-from rich.table import Table
 from rich.text import Text
 
-from reconros_zenoh.cli.console import interrupted, wide_console
+from reconros_zenoh.cli.console import interrupted, new_table, wide_console
 from reconros_zenoh.cli.options import AsJson, project_prints
 from reconros_zenoh.cli.progress import run_bar
 from reconros_zenoh.cli.service_commands import read_deployment
@@ -101,11 +99,7 @@ def simulate(
 
 
 def _print_table(console: Console, summaries: Mapping[str, Mapping[str, Mapping[str, Any]]]) -> None:
-    table = Table(box=SIMPLE_HEAD, padding=0, show_edge=False)
-    table.add_column("board", overflow="fold")
-    table.add_column("client", overflow="fold")
-    for column in ("n", "lost", "wrong", "median", "p95", "p99"):
-        table.add_column(column, justify="right", no_wrap=True)
+    table = new_table(("board", "client"), ("n", "lost", "wrong", "median", "p95", "p99"))
     for board, services in summaries.items():
         for service, cell in services.items():
             table.add_row(

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, get_args
 
-from rich.box import SIMPLE_HEAD
-from rich.table import Table
 from rich.text import Text
 
 from reconros_zenoh.board.spans import Stage
+from reconros_zenoh.cli.console import print_rows, short_ms
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Mapping
 
     from rich.console import Console
 
@@ -28,7 +27,7 @@ def print_status(console: Console, status: Mapping[str, Any]) -> None:
         f"domain {status['domain']}",
         highlight=False,
     )
-    _print(
+    print_rows(
         console,
         ("callback", "kind", "runs in", "time from", "calls", "failed", "dropped"),
         (
@@ -36,7 +35,7 @@ def print_status(console: Console, status: Mapping[str, Any]) -> None:
             for name, each in status["callbacks"].items()
         ),
     )
-    _print(
+    print_rows(
         console,
         ("slot", "holds", "reconfigured", "reconfiguring [ms]", "ICAP wait [ms]", "busy [ms]"),
         (
@@ -57,7 +56,7 @@ def print_status(console: Console, status: Mapping[str, Any]) -> None:
         listed = ", ".join(f"{name} {100 * share:.1f} %" for name, share in shares)
         console.print(f"busy: {listed}\n", highlight=False)
     _print_spans(console, status["spans_ms"])
-    _print(
+    print_rows(
         console,
         ("publishes", "sent", "dropped", "age [ms]: median", "p95", "max"),
         (
@@ -66,12 +65,12 @@ def print_status(console: Console, status: Mapping[str, Any]) -> None:
             if each["sent"] or each["dropped"]
         ),
     )
-    _print(
+    print_rows(
         console,
         ("stream", "passed", "dropped", "waits for room"),
         ((key, hmt["passed"], hmt["dropped"], hmt["waits"]) for key, hmt in status["hmt"].items()),
     )
-    _print(
+    print_rows(
         console,
         ("gateway", "hardware-mapped", "software-mapped", "to hardware", "to software"),
         ((g["name"], g["hmt"], g["smt"], g["to_hmt"], g["to_smt"]) for g in status["gateways"]),
@@ -103,7 +102,7 @@ def _print_spans(console: Console, spans_ms: Mapping[str, Mapping[str, float]]) 
         shown = [spans_ms[name] for name in names]
         stages = [stage for stage in get_args(Stage) if any(stage in each for each in shown)]
         rows = [[stage, *(each.get(stage, 0.0) for each in shown)] for stage in stages]
-        _print(console, ("mean [ms]", *names), [*rows, ["sum", *(sum(each.values()) for each in shown)]])
+        print_rows(console, ("mean [ms]", *names), [*rows, ["sum", *(sum(each.values()) for each in shown)]])
 
 
 def _print_host(console: Console, host: Mapping[str, Any]) -> None:
@@ -111,7 +110,7 @@ def _print_host(console: Console, host: Mapping[str, Any]) -> None:
     results = "1 result" if host["overruns"] == 1 else f"{host['overruns']} results"
     console.print(
         Text(
-            f"host: {lag}{results} later than modelled ({_ms(host['overrun_ms'])} ms in all)",
+            f"host: {lag}{results} later than modelled ({short_ms(host['overrun_ms'])} ms in all)",
             style="yellow" if host["overruns"] else "",
         )
     )
@@ -124,26 +123,3 @@ def _places(callback: Mapping[str, Any]) -> str:
 
 def _timing(callback: Mapping[str, Any]) -> str:
     return ", ".join(dict.fromkeys(str(timing["basis"]) for timing in callback["timing"].values()))
-
-
-def _ms(value: float) -> str:
-    return f"{value:.3g}" if value < 1000 else f"{value:.0f}"
-
-
-def _cell(value: object) -> str:
-    return "-" if value is None else _ms(value) if isinstance(value, float) else str(value)
-
-
-def _print(console: Console, columns: Iterable[str], rows: Iterable[Iterable[object]]) -> None:
-    """Print a table unless it has no rows; numbers stand to the right, and those with a fraction are ms."""
-    content = [list(row) for row in rows]
-    if not content:
-        return
-    table = Table(box=SIMPLE_HEAD, show_edge=False, padding=(0, 1, 0, 0))
-    for index, column in enumerate(columns):
-        numbers = all(isinstance(row[index], int | float | None) for row in content)
-        table.add_column(Text(column), justify="right" if numbers else "left", overflow="fold")
-    for row in content:
-        table.add_row(*(Text(_cell(value)) for value in row))
-    console.print(table, highlight=False)
-    console.print()

@@ -9,16 +9,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.text import Text
 
-from reconros_zenoh.cli.console import interrupted, titled_table, wide_console
+from reconros_zenoh.cli.console import interrupted, new_table, wide_console
 from reconros_zenoh.cli.options import AsJson, ClockName, Profile
 from reconros_zenoh.cli.progress import run_bar
+from reconros_zenoh.mapping.graph import Side
 from reconros_zenoh.measure.statistics import format_error, format_ms, format_share
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
     from rich.console import Console
-    from rich.table import Table
 
 Clock = Annotated[ClockName, typer.Option(help="Real time on this host, or virtual time.")]
 
@@ -41,11 +41,11 @@ def callbacks(
     kernels stand beside it.
     """
     from reconros_zenoh.board.profile import read_profile
-    from reconros_zenoh.experiments.callbacks import PLACES, TABLE_I, measure_callbacks
+    from reconros_zenoh.experiments.callbacks import TABLE_I, measure_callbacks
 
     digits = _classified(accuracy) if accuracy else {}
     model = read_profile(profile)
-    with run_bar("callbacks alone", len(TABLE_I) * len(PLACES), quiet=as_json) as advance:
+    with run_bar("callbacks alone", len(TABLE_I) * len(Side), quiet=as_json) as advance:
         result = measure_callbacks(clock.value, model, repeat, advance) | digits
     if as_json:
         print(json.dumps(result))
@@ -107,23 +107,9 @@ def _show_callbacks(result: Mapping[str, Any]) -> None:
 
 
 def _print_callbacks(console: Console, result: Mapping[str, Any]) -> None:
-    table = _table(
-        f"Table I, {result['clock']} clock, profile {result['profile']}",
-        (
-            "",
-            "HW",
-            "comp.",
-            "MEMIF",
-            "calls",
-            "paper",
-            "dev.",
-            "SW",
-            "paper",
-            "dev.",
-            "SW/HW",
-            "paper",
-        ),
-    )
+    figures = ["HW", "comp.", "MEMIF", "calls", "paper", "dev.", "SW", "paper", "dev.", "SW/HW", "paper"]
+    title = f"Table I, {result['clock']} clock, profile {result['profile']}"
+    table = new_table(("",), figures, title=title)
     for name, row in result["callbacks"].items():
         split = row["hardware"]
         table.add_row(
@@ -148,10 +134,9 @@ def _print_callbacks(console: Console, result: Mapping[str, Any]) -> None:
 
 
 def _print_host(console: Console, result: Mapping[str, Any]) -> None:
-    table = _table(
-        f"This host ({result['host']['machine']}), medians over {result['repeat']} requests",
-        ("callback", "HW elapsed", "SW elapsed", "kernel", "affords HW", "affords SW"),
-    )
+    figures = ("HW elapsed", "SW elapsed", "kernel", "affords HW", "affords SW")
+    title = f"This host ({result['host']['machine']}), medians over {result['repeat']} requests"
+    table = new_table(("callback",), figures, title=title)
     for name, row in result["callbacks"].items():
         table.add_row(
             name,
@@ -175,10 +160,9 @@ def _print_host(console: Console, result: Mapping[str, Any]) -> None:
 
 
 def _print_slots(console: Console, result: Mapping[str, Any]) -> None:
-    table = _table(
-        f"Table II, {result['clock']} clock, profile {result['profile']}, {result['writes']} writes per slot",
-        ("slot", "LUT", "DSP", "BRAM 36/18", "S [B]", "paper", "t_rc", "min", "max", "paper", "dev."),
-    )
+    figures = ("LUT", "DSP", "BRAM 36/18", "S [B]", "paper", "t_rc", "min", "max", "paper", "dev.")
+    run = f"{result['clock']} clock, profile {result['profile']}, {result['writes']} writes per slot"
+    table = new_table(("slot",), figures, title=f"Table II, {run}")
     for slot, row in result["slots"].items():
         table.add_row(
             f"RS{slot}",
@@ -202,10 +186,8 @@ def _print_regression(console: Console, result: Mapping[str, Any]) -> None:
     paper = result["paper"]
     ours = paper["regression_of_table"]
     slots = [f"RS{slot}" for slot, _ in enumerate(ours["residuals_ms"])]
-    table = _table(
-        "t_rc = S / B + t_offset, with the residuals [ms] of each slot",
-        ("", "t_offset [ms]", "B [MB/s]", *slots),
-    )
+    title = "t_rc = S / B + t_offset, with the residuals [ms] of each slot"
+    table = new_table(("",), ("t_offset [ms]", "B [MB/s]", *slots), title=title)
     for name, values in (
         ("measured here", result["regression"]),
         ("printed t_rc, our regression", ours),
@@ -231,10 +213,8 @@ def _print_regression(console: Console, result: Mapping[str, Any]) -> None:
 
 
 def _print_what_if(console: Console, result: Mapping[str, Any]) -> None:
-    table = _table(
-        "What if: t_rc [ms]",
-        ("slot", "S [B]", "now", "ZyCAP nominal", "PCAP", "zero-copy"),
-    )
+    figures = ("S [B]", "now", "ZyCAP nominal", "PCAP", "zero-copy")
+    table = new_table(("slot",), figures, title="What if: t_rc [ms]")
     rows: Iterable[tuple[str, Mapping[str, Any], float]] = [
         *((f"RS{slot}", row, row["mean_ms"]) for slot, row in result["slots"].items()),
         *((row["region"], row, row["t_rc_ms"]) for row in result["regions"]),
@@ -271,14 +251,6 @@ def _print_what_if(console: Console, result: Mapping[str, Any]) -> None:
         f"{format_share(fit['largest_error'])} off on these; each estimated from the others: {left_out}. "
         "Far from their sizes, or on a family other than the 7 series, take it as a guess.",
     )
-
-
-def _table(title: str, columns: Iterable[str]) -> Table:
-    table = titled_table(title)
-    for index, column in enumerate(columns):
-        # As text: a unit in brackets is no markup.
-        table.add_column(Text(column), justify="right" if index else "left", overflow="fold")
-    return table
 
 
 def _marked(value_ms: float, basis: str) -> str:

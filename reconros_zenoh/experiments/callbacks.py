@@ -5,9 +5,8 @@ from __future__ import annotations
 import statistics
 import time
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
-from board_daemon.hosting import BoardOptions, HostedBoard
 from host_clients.closed_loop import ClosedLoop
 from host_clients.suite import exchange
 from reconros_zenoh.board.host import Host, computed
@@ -19,7 +18,9 @@ from reconros_zenoh.experiments.interruption import until_interrupted
 from reconros_zenoh.experiments.profile_file import varied
 from reconros_zenoh.experiments.provenance import host
 from reconros_zenoh.experiments.roundtrip import application
-from reconros_zenoh.project.mapping_file import CallbackMapping, Mapping
+from reconros_zenoh.mapping.graph import Side
+from reconros_zenoh.project.hosting import BoardOptions, HostedBoard
+from reconros_zenoh.project.mapping_file import CallbackMapping, ProjectMapping
 from reconros_zenoh.rmw.node import Context
 from reconros_zenoh.transport.simulated import SimulatedNetwork
 
@@ -36,15 +37,12 @@ if TYPE_CHECKING:
     from reconros_zenoh.measure.record import RoundTrip
     from reconros_zenoh.project.loader import Project
 
-Place = Literal["hardware", "software"]
-PLACES: tuple[Place, ...] = ("hardware", "software")
-
 _LIMIT_NS = 10_000_000_000
 _SEED = 0
 
 
 @dataclass(frozen=True, slots=True)
-class Published:
+class PrintedTimes:
     """One row of Table I."""
 
     hardware_ms: float
@@ -53,11 +51,11 @@ class Published:
 
 
 TABLE_I = {
-    "sobel": Published(16.5, 42.0, 2.5),
-    "sort": Published(0.85, 41.0, 48.2),
-    "mnist": Published(11.9, 16.5, 1.4),
-    "inverse": Published(0.35, 1.5, 4.3),
-    "hash": Published(81.0, 94.0, 1.2),
+    "sobel": PrintedTimes(16.5, 42.0, 2.5),
+    "sort": PrintedTimes(0.85, 41.0, 48.2),
+    "mnist": PrintedTimes(11.9, 16.5, 1.4),
+    "inverse": PrintedTimes(0.35, 1.5, 4.3),
+    "hash": PrintedTimes(81.0, 94.0, 1.2),
 }
 """In the order of the paper."""
 
@@ -102,12 +100,12 @@ def measure_callbacks(
     overruns = 0
     with until_interrupted() as interruption:
         for name in TABLE_I:
-            runs: dict[Place, Isolated] = {}
-            for place in PLACES:
-                runs[place] = run_alone(clock, quiet, project, name, place, repeat)
-                overruns += runs[place].overruns
+            runs: dict[Side, Isolated] = {}
+            for side in Side:
+                runs[side] = run_alone(clock, quiet, project, name, side, repeat)
+                overruns += runs[side].overruns
                 on_run()
-            table[name] = _row(name, runs["hardware"], runs["software"], model)
+            table[name] = _row(name, runs[Side.HARDWARE], runs[Side.SOFTWARE], model)
     return {
         "experiment": "callbacks",
         "clock": clock,
@@ -122,7 +120,7 @@ def measure_callbacks(
 
 
 def run_alone(
-    clock: Clock, profile: Profile, project: Project, callback: str, place: Place, repeat: int
+    clock: Clock, profile: Profile, project: Project, callback: str, side: Side, repeat: int
 ) -> Isolated:
     """Run one callback of the project on a board of its own, one request at a time.
 
@@ -131,7 +129,7 @@ def run_alone(
     """
     environment = WallEnvironment() if clock == "wall" else VirtualEnvironment()
     network = SimulatedNetwork(environment)
-    mapping = _alone(project, callback, place)
+    mapping = _alone(project, callback, side)
     hosted = HostedBoard(environment, network.transport("b0"), profile, project, mapping, BoardOptions())
     watch = _Watch()
     board = hosted.board
@@ -143,7 +141,7 @@ def run_alone(
 
     def record(round_trip: RoundTrip) -> None:
         if round_trip.outcome != "ok":
-            raise ExperimentError(f"an answer of callback {callback!r} in {place} was {round_trip.outcome}.")
+            raise ExperimentError(f"an answer of callback {callback!r} in {side} was {round_trip.outcome}.")
         watch.end_request()
 
     loop = ClosedLoop(
@@ -167,12 +165,12 @@ def run_alone(
     return Isolated(stages_ms, watch.elapsed_ms, watch.kernel_ms, board.host.overruns.count)
 
 
-def _alone(project: Project, callback: str, place: Place) -> Mapping:
+def _alone(project: Project, callback: str, side: Side) -> ProjectMapping:
     """Return a mapping under which this callback has a worker and no other callback has a place."""
     (slot, *_) = next(thread.slots for thread in project.configuration.threads if thread.name == callback)
-    in_hardware = place == "hardware"
-    return Mapping(
-        name=f"{callback} alone in {place}",
+    in_hardware = side is Side.HARDWARE
+    return ProjectMapping(
+        name=f"{callback} alone in {side}",
         executor="reconros",
         software_workers=0 if in_hardware else 1,
         hardware_workers=len(project.slots) if in_hardware else 0,

@@ -14,17 +14,18 @@ from reconros_zenoh.experiments.stimulus import feed
 from reconros_zenoh.mapping.project_graph import OUTSIDE, read_project_graph, topic_ends
 from reconros_zenoh.measure.record import RecordWriter, RoundTrip
 from reconros_zenoh.measure.statistics import summarise
+from reconros_zenoh.project.hosting import BoardOptions
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
     from pathlib import Path
 
-    from board_daemon.hosting import BoardOptions
     from reconros_zenoh.board.profile import Profile
     from reconros_zenoh.experiments.stimulus import Stimulus
     from reconros_zenoh.project.build_cfg import BuildConfiguration
+    from reconros_zenoh.project.hosting import BoardOptions
     from reconros_zenoh.project.loader import Project
-    from reconros_zenoh.project.mapping_file import Mapping as CallbackMapping
+    from reconros_zenoh.project.mapping_file import ProjectMapping
 
 _FIGURES = {"median_ms": 50.0, "p95_ms": 95.0, "p99_ms": 99.0, "max_ms": 100.0}
 
@@ -71,7 +72,7 @@ class MappingRun:
 
 
 def outside_topics(
-    configuration: BuildConfiguration, mapping: CallbackMapping, kind: Literal["rossub", "rospub"]
+    configuration: BuildConfiguration, mapping: ProjectMapping, kind: Literal["rossub", "rospub"]
 ) -> dict[str, str]:
     """Return the topics, with their types, that a project has with the outside.
 
@@ -93,7 +94,7 @@ def outside_topics(
 def run_mapping(
     profile: Profile,
     project: Project,
-    mapping: CallbackMapping,
+    mapping: ProjectMapping,
     stimulus: Stimulus,
     outputs: Mapping[str, str],
     seconds: float,

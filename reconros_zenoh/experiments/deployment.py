@@ -16,15 +16,15 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
     from pathlib import Path
 
-    from board_daemon.hosting import BoardOptions, HostedBoard
     from host_clients.camera import CameraOptions
     from host_clients.daemon import ClientOptions
     from host_clients.desktop import ViewerOptions
     from host_clients.robot import RobotOptions
     from reconros_zenoh.board.profile import Profile
     from reconros_zenoh.measure.record import RoundTrip
+    from reconros_zenoh.project.hosting import BoardOptions, HostedBoard
     from reconros_zenoh.project.loader import Project
-    from reconros_zenoh.project.mapping_file import Mapping as CallbackMapping
+    from reconros_zenoh.project.mapping_file import ProjectMapping
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +33,7 @@ class BoardPlan:
 
     profile: Profile
     project: Project
-    mapping: CallbackMapping
+    mapping: ProjectMapping
     options: BoardOptions
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from contextlib import ExitStack
 from typing import TYPE_CHECKING
 
-from board_daemon.hosting import BoardOptions
 from host_clients.camera import CameraOptions
 from host_clients.gallery import Gallery
 from reconros_zenoh.board.control import status
@@ -13,6 +12,7 @@ from reconros_zenoh.board.profile import read_profile
 from reconros_zenoh.experiments.design import RATE_HZ, VARIANTS, Ending, projects_folder
 from reconros_zenoh.experiments.simulation import Simulation
 from reconros_zenoh.measure.record import RecordWriter
+from reconros_zenoh.project.hosting import BoardOptions
 from reconros_zenoh.project.loader import load_project
 
 if TYPE_CHECKING:

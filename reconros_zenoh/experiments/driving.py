@@ -12,7 +12,6 @@ from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from board_daemon.hosting import BoardOptions
 from host_clients.robot import RobotOptions, Step, most_off_lane_mm, stood_s
 from reconros_zenoh.applications.driving.chain import STATIONS, Chain
 from reconros_zenoh.applications.driving.kernels import LANE_WIDTH
@@ -24,6 +23,7 @@ from reconros_zenoh.mapping.apply import apply_mapping
 from reconros_zenoh.mapping.communication import TopicMapping, map_topics
 from reconros_zenoh.mapping.project_graph import read_project_graph
 from reconros_zenoh.measure.record import RecordWriter, RoundTrip
+from reconros_zenoh.project.hosting import BoardOptions
 from reconros_zenoh.project.loader import Project, read_project
 
 if TYPE_CHECKING:

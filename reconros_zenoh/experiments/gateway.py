@@ -8,7 +8,6 @@ from importlib.resources import as_file, files
 from itertools import product
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
-from board_daemon.hosting import BoardOptions, HostedBoard
 from reconros_zenoh.applications.gateway.nodes import SUBSCRIBERS, random_body, run_nodes
 from reconros_zenoh.board.sources import Event, Source
 from reconros_zenoh.board.spans import Timeline
@@ -17,8 +16,10 @@ from reconros_zenoh.clock.wall import WallEnvironment
 from reconros_zenoh.errors import ExperimentError, UsageError
 from reconros_zenoh.experiments.interruption import until_interrupted
 from reconros_zenoh.experiments.provenance import host
+from reconros_zenoh.mapping.graph import Side
+from reconros_zenoh.project.hosting import BoardOptions, HostedBoard
 from reconros_zenoh.project.loader import load_project
-from reconros_zenoh.project.mapping_file import CallbackMapping, Mapping
+from reconros_zenoh.project.mapping_file import CallbackMapping, ProjectMapping
 from reconros_zenoh.transport.simulated import SimulatedNetwork
 
 if TYPE_CHECKING:
@@ -31,9 +32,7 @@ if TYPE_CHECKING:
     from reconros_zenoh.experiments.roundtrip import Clock
     from reconros_zenoh.project.application import Application
 
-Publisher = Literal["hardware", "software"]
 Variant = Literal["smt", "bridged"]
-PUBLISHERS: tuple[Publisher, ...] = get_args(Publisher)
 SIZES = {"10kB": 10_000, "100kB": 100_000, "1MB": 1_000_000, "10MB": 10_000_000}
 COUNTS = (2, 4, 8)
 
@@ -57,7 +56,7 @@ class Times:
 class Cell:
     """What was measured of one publisher, size [bytes] and number of hardware subscribers."""
 
-    publisher: Publisher
+    publisher: Side
     size: int
     subscribers: int
     smt: Times
@@ -81,7 +80,7 @@ class Cell:
 def measure_gateway(
     clock: Clock,
     profile: Profile,
-    publishers: Iterable[Publisher],
+    publishers: Iterable[Side],
     sizes: Iterable[int],
     counts: Sequence[int],
     repeat: int,
@@ -128,18 +127,18 @@ def anchors(cells: Iterable[Cell]) -> list[dict[str, Any]]:
     `error` is relative. Of the ranges the text does not say where they end: by its trends at the smallest and
     the largest of messages and numbers of subscribers.
     """
-    found: dict[tuple[Publisher, int, int], Cell] = {
+    found: dict[tuple[Side, int, int], Cell] = {
         (cell.publisher, cell.size, cell.subscribers): cell for cell in cells
     }
     small, large, few, many = SIZES["10kB"], SIZES["10MB"], COUNTS[0], COUNTS[-1]
-    wanted: tuple[tuple[str, float, tuple[Publisher, int, int], Literal["hw", "sw"]], ...] = (
-        ("hardware to hardware, 8 subscribers, 10 kB", 1.94, ("hardware", small, many), "hw"),
-        ("hardware to hardware, 8 subscribers, 10 MB", 7.95, ("hardware", large, many), "hw"),
-        ("hardware to software, smallest", 0.5, ("hardware", small, few), "sw"),
-        ("hardware to software, 8 subscribers, 10 MB", 1.0, ("hardware", large, many), "sw"),
-        ("software to hardware, largest", 3.79, ("software", large, many), "hw"),
-        ("software to software, smallest", 1.06, ("software", small, few), "sw"),
-        ("software to software, largest", 2.05, ("software", large, many), "sw"),
+    wanted: tuple[tuple[str, float, tuple[Side, int, int], Literal["hw", "sw"]], ...] = (
+        ("hardware to hardware, 8 subscribers, 10 kB", 1.94, (Side.HARDWARE, small, many), "hw"),
+        ("hardware to hardware, 8 subscribers, 10 MB", 7.95, (Side.HARDWARE, large, many), "hw"),
+        ("hardware to software, smallest", 0.5, (Side.HARDWARE, small, few), "sw"),
+        ("hardware to software, 8 subscribers, 10 MB", 1.0, (Side.HARDWARE, large, many), "sw"),
+        ("software to hardware, largest", 3.79, (Side.SOFTWARE, large, many), "hw"),
+        ("software to software, smallest", 1.06, (Side.SOFTWARE, small, few), "sw"),
+        ("software to software, largest", 2.05, (Side.SOFTWARE, large, many), "sw"),
     )
     rows = []
     for name, paper, key, side in wanted:
@@ -149,17 +148,17 @@ def anchors(cells: Iterable[Cell]) -> list[dict[str, Any]]:
     return rows
 
 
-def setup_mapping(publisher: Publisher, count: int) -> Mapping:
+def setup_mapping(publisher: Side, count: int) -> ProjectMapping:
     """Return the mapping with this publisher and so many hardware subscribers; other nodes have no place."""
     nowhere = CallbackMapping()
-    return Mapping(
+    return ProjectMapping(
         name=f"{publisher} publisher, {count} hardware subscribers",
         executor="reconros",
         software_workers=2,
         hardware_workers=1 + SUBSCRIBERS,
         callbacks={
-            "publisher_hardware": CallbackMapping(slots=(0,)) if publisher == "hardware" else nowhere,
-            "publisher_software": CallbackMapping(software=True) if publisher == "software" else nowhere,
+            "publisher_hardware": CallbackMapping(slots=(0,)) if publisher is Side.HARDWARE else nowhere,
+            "publisher_software": CallbackMapping(software=True) if publisher is Side.SOFTWARE else nowhere,
             "software": CallbackMapping(software=True),
             **{
                 f"hardware_{index}": CallbackMapping(slots=(index + 1,)) if index < count else nowhere
@@ -173,7 +172,7 @@ def _run(
     clock: Clock,
     profile: Profile,
     variant: Variant,
-    publisher: Publisher,
+    publisher: Side,
     count: int,
     body: NDArray[np.uint8],
     repeat: int,

@@ -22,6 +22,7 @@ from reconros_zenoh.experiments.gateway_processes import run_board, run_listener
 from reconros_zenoh.experiments.interruption import until_interrupted
 from reconros_zenoh.experiments.provenance import host
 from reconros_zenoh.experiments.wall import free_port
+from reconros_zenoh.mapping.graph import Side
 from reconros_zenoh.transport.zenoh import ZenohRouter
 from reconros_zenoh.transport.zenoh_session import has_shared_memory
 
@@ -81,7 +82,7 @@ def measure_native(
             networks.enter_context(ZenohRouter.open(endpoint))
         for size, count in product(sizes, counts):
             times = take_turns(partial(_begin_cell, routers, size, count), repeat)
-            cells.append(Cell("software", size, count, times["smt"], times["bridged"]))
+            cells.append(Cell(Side.SOFTWARE, size, count, times["smt"], times["bridged"]))
             on_cell()
     return {
         "experiment": "gateway",

@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from board_daemon.hosting import BoardOptions, HostedBoard
 from reconros_zenoh.applications.gateway.nodes import random_body
 from reconros_zenoh.board.executor import Executor
 from reconros_zenoh.board.profile import read_profile
@@ -25,6 +24,8 @@ from reconros_zenoh.clock.virtual import succeed_once
 from reconros_zenoh.clock.wall import WallEnvironment
 from reconros_zenoh.executor.callbacks import CallbackKind
 from reconros_zenoh.experiments.gateway import setup_mapping
+from reconros_zenoh.mapping.graph import Side
+from reconros_zenoh.project.hosting import BoardOptions, HostedBoard
 from reconros_zenoh.project.loader import load_project
 from reconros_zenoh.project.mapping_file import CallbackMapping
 from reconros_zenoh.rmw.node import Context
@@ -41,7 +42,7 @@ if TYPE_CHECKING:
     from reconros_zenoh.clock.activity import Awaitable
     from reconros_zenoh.experiments.gateway import Variant
     from reconros_zenoh.project.application import Application
-    from reconros_zenoh.project.mapping_file import Mapping
+    from reconros_zenoh.project.mapping_file import ProjectMapping
 
 _TOPIC = "/a"
 _TYPE = "sensor_msgs/msg/Image"
@@ -96,7 +97,7 @@ def run_board(connection: Connection, router: str, variant: Variant, count: int)
             transport,
             read_profile("native"),
             replace(project, main=partial(_run_hardware_nodes, receiver)),
-            _hardware_only(setup_mapping("software", count)),
+            _hardware_only(setup_mapping(Side.SOFTWARE, count)),
             BoardOptions(),
         )
 
@@ -113,7 +114,7 @@ def run_board(connection: Connection, router: str, variant: Variant, count: int)
             hosted.close()
 
 
-def _hardware_only(mapping: Mapping) -> Mapping:
+def _hardware_only(mapping: ProjectMapping) -> ProjectMapping:
     """Return the mapping without its software nodes, which have processes of their own."""
     places = {name: place if place.slots else CallbackMapping() for name, place in mapping.callbacks.items()}
     return mapping.model_copy(update={"callbacks": places})

@@ -8,7 +8,6 @@ from functools import lru_cache
 from itertools import count
 from typing import TYPE_CHECKING, Self
 
-from board_daemon.hosting import BoardOptions, HostedBoard
 from host_clients.camera import Camera
 from host_clients.closed_loop import ClosedLoop
 from host_clients.group import gather
@@ -20,6 +19,7 @@ from reconros_zenoh.clock.process import tune_memory
 from reconros_zenoh.clock.virtual import VirtualEnvironment
 from reconros_zenoh.errors import TransportError
 from reconros_zenoh.measure.trace_file import traced_to
+from reconros_zenoh.project.hosting import BoardOptions, HostedBoard
 from reconros_zenoh.rmw.node import Context
 from reconros_zenoh.transport.simulated import SimulatedNetwork
 
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from reconros_zenoh.board.profile import Profile
     from reconros_zenoh.measure.record import RoundTrip
     from reconros_zenoh.project.loader import Project
-    from reconros_zenoh.project.mapping_file import Mapping
+    from reconros_zenoh.project.mapping_file import ProjectMapping
     from reconros_zenoh.ros.types import TypeRegistry
 
 _SEEDS_KEPT = 4  # 15 MB each
@@ -76,7 +76,7 @@ class Simulation:
         self._network = SimulatedNetwork(self.environment)
 
     def add_board(
-        self, profile: Profile, project: Project, mapping: Mapping, options: BoardOptions
+        self, profile: Profile, project: Project, mapping: ProjectMapping, options: BoardOptions
     ) -> HostedBoard:
         """Return a board that serves from the beginning, and whose trace is written at the end.
 
@@ -161,7 +161,7 @@ class Simulation:
             self.environment.run(until=round(seconds * 1e9))
 
 
-def check_hosting(profile: Profile, project: Project, mapping: Mapping) -> None:
+def check_hosting(profile: Profile, project: Project, mapping: ProjectMapping) -> None:
     """Raise UsageError or FileError when no board of this kind can host the project under this mapping."""
     with Simulation(project.types()) as simulation:
         simulation.add_board(profile, project, mapping, BoardOptions())

@@ -6,22 +6,22 @@ from contextlib import ExitStack
 from functools import partial
 from typing import TYPE_CHECKING
 
-from board_daemon.hosting import BoardOptions
 from host_clients.daemon import ClientOptions
 from reconros_zenoh.board.control import status
 from reconros_zenoh.board.profile import read_profile
 from reconros_zenoh.experiments.roundtrip import ANSWER_LIMIT_S, CLIENTS, BoardReport, application
 from reconros_zenoh.experiments.simulation import Simulation
 from reconros_zenoh.measure.record import RecordWriter
+from reconros_zenoh.project.hosting import BoardOptions
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
     from pathlib import Path
 
-    from board_daemon.hosting import HostedBoard
     from reconros_zenoh.board.profile import Profile
     from reconros_zenoh.experiments.roundtrip import Plan
     from reconros_zenoh.measure.record import RoundTrip
+    from reconros_zenoh.project.hosting import HostedBoard
 
 
 def run_virtual(plan: Plan, report: BoardReport, on_progress: Callable[[str, str], None]) -> None:

@@ -22,13 +22,13 @@ if TYPE_CHECKING:
 
     from reconros_zenoh.project.build_cfg import BuildConfiguration
     from reconros_zenoh.project.ini import Option
-    from reconros_zenoh.project.mapping_file import Mapping as NodeMapping
+    from reconros_zenoh.project.mapping_file import ProjectMapping
 
 _WORD = re.compile(r'"[^"\n]*"|[^\s,"]+')
 
 
 def apply_mapping(
-    configuration: BuildConfiguration, node_mapping: NodeMapping, mappings: Mapping[str, TopicMapping]
+    configuration: BuildConfiguration, node_mapping: ProjectMapping, mappings: Mapping[str, TopicMapping]
 ) -> list[str]:
     """Write the mapping of topics into the project file; return what was changed, nothing if all is there.
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from reconros_zenoh.errors import GraphError
 from reconros_zenoh.mapping.graph import ComputationGraph, Side, Topic
-from reconros_zenoh.yaml_node import Node
+from reconros_zenoh.yaml_node import YamlNode
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping
@@ -21,7 +21,7 @@ def read_graph_file(path: Path) -> ComputationGraph:
     `nodes` maps each node to `hardware` or `software`, `topics` each topic to its `publishers`, `subscribers`
     and, where they are known, `size` [bytes] and `rate` [messages per second].
     """
-    root = Node.read(path, {})
+    root = YamlNode.read(path, {})
     entries = root.mapping()
     _check_keys(entries, ("nodes", "topics"))
     for key in ("nodes", "topics"):
@@ -35,14 +35,14 @@ def read_graph_file(path: Path) -> ComputationGraph:
         raise _find(root, error.place).error(error.problem, error.remedy) from None
 
 
-def _side(node: Node) -> Side:
+def _side(node: YamlNode) -> Side:
     text = node.text()
     if text not in set(Side):
         raise node.error(f"is {text!r}.", f"Write {' or '.join(Side)}.")
     return Side(text)
 
 
-def _topic(name: str, node: Node) -> Topic:
+def _topic(name: str, node: YamlNode) -> Topic:
     entries = node.mapping()
     _check_keys(entries, _TOPIC_KEYS)
     ends = {
@@ -58,13 +58,13 @@ def _topic(name: str, node: Node) -> Topic:
     )
 
 
-def _check_keys(entries: Mapping[str, Node], known: Collection[str]) -> None:
+def _check_keys(entries: Mapping[str, YamlNode], known: Collection[str]) -> None:
     for key, node in entries.items():
         if key not in known:
             raise node.error("is not a key of a graph file.", f"Known here: {', '.join(known)}.")
 
 
-def _find(node: Node, place: tuple[str | int, ...]) -> Node:
+def _find(node: YamlNode, place: tuple[str | int, ...]) -> YamlNode:
     for key in place:
         node = node.sequence()[key] if isinstance(key, int) else node.mapping()[key]
     return node

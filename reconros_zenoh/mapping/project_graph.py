@@ -10,10 +10,10 @@ from reconros_zenoh.mapping.graph import ComputationGraph, Side, Topic
 from reconros_zenoh.project.communication import endpoint_name, gateway_pair
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping as Map
+    from collections.abc import Mapping
 
     from reconros_zenoh.project.build_cfg import BuildConfiguration
-    from reconros_zenoh.project.mapping_file import Mapping
+    from reconros_zenoh.project.mapping_file import ProjectMapping
     from reconros_zenoh.project.resource_groups import Resource
 
 OUTSIDE = {"rospub": "(from outside)", "rossub": "(to outside)"}
@@ -36,7 +36,7 @@ def gateway_topics(configuration: BuildConfiguration) -> dict[str, str]:
     return {pair.hmt: pair.smt for pair in pairs}
 
 
-def topic_ends(configuration: BuildConfiguration, mapping: Mapping) -> list[TopicEnd]:
+def topic_ends(configuration: BuildConfiguration, mapping: ProjectMapping) -> list[TopicEnd]:
     """Return all ends of topics in the order of the file; FileError for a name that ROS 2 does not allow.
 
     A thread is in hardware if `mapping` gives it a slot. A group that no thread uses belongs to main.py:
@@ -61,7 +61,7 @@ def topic_ends(configuration: BuildConfiguration, mapping: Mapping) -> list[Topi
     return ends
 
 
-def read_project_graph(configuration: BuildConfiguration, mapping: Mapping) -> ComputationGraph:
+def read_project_graph(configuration: BuildConfiguration, mapping: ProjectMapping) -> ComputationGraph:
     """Return the graph of all nodes that have topics; see `topic_ends` for what is in hardware.
 
     A ROS node with callbacks on both sides becomes a node on each. A topic of which the project has only
@@ -95,7 +95,7 @@ def read_project_graph(configuration: BuildConfiguration, mapping: Mapping) -> C
 
 
 def shared_slots(
-    configuration: BuildConfiguration, mapping: Mapping, mappings: Map[str, TopicMapping]
+    configuration: BuildConfiguration, mapping: ProjectMapping, mappings: Mapping[str, TopicMapping]
 ) -> list[str]:
     """Return a sentence for each two callbacks that share slots and are joined by a stream.
 
@@ -124,7 +124,7 @@ def shared_slots(
     return notes
 
 
-def _notes(configuration: BuildConfiguration, mapping: Mapping, outside: list[str]) -> tuple[str, ...]:
+def _notes(configuration: BuildConfiguration, mapping: ProjectMapping, outside: list[str]) -> tuple[str, ...]:
     types = {resource.type for resource in configuration.resources}
     notes = [f"Callbacks are where the mapping {mapping.name!r} has them; --mapping chooses another."]
     if types & {"rossrvs", "rossrvc", "rosactions", "rosactionc"}:

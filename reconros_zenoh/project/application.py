@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from reconros_zenoh.board.timing import Timing
     from reconros_zenoh.board.writers import MessageWriter
     from reconros_zenoh.project.loader import Project
-    from reconros_zenoh.project.mapping_file import Mapping
+    from reconros_zenoh.project.mapping_file import ProjectMapping
     from reconros_zenoh.project.resource_groups import Resource
     from reconros_zenoh.rmw.node import Node
     from reconros_zenoh.ros.qos import QosProfile
@@ -47,7 +47,12 @@ class Application:
     """
 
     def __init__(
-        self, project: Project, board: Board, mapping: Mapping, types: TypeRegistry, bitstreams: Path | None
+        self,
+        project: Project,
+        board: Board,
+        mapping: ProjectMapping,
+        types: TypeRegistry,
+        bitstreams: Path | None,
     ) -> None:
         self.project = project
         self.board = board

@@ -16,7 +16,7 @@ from reconros_zenoh.project.build_cfg import read_build_cfg
 from reconros_zenoh.project.communication import check_fifos, check_places, check_topics
 from reconros_zenoh.project.interfaces import read_interfaces
 from reconros_zenoh.project.main_file import load_main, running_project
-from reconros_zenoh.project.mapping_file import Mapping, built_for, read_mapping
+from reconros_zenoh.project.mapping_file import ProjectMapping, built_for, read_mapping
 from reconros_zenoh.project.resources import slot_resources
 from reconros_zenoh.project.target import target_profile
 from reconros_zenoh.text_file import read_text_file
@@ -88,14 +88,14 @@ class ProjectFiles:
     def _profile(self) -> Profile:
         return read_profile(target_profile(self.configuration))
 
-    def mapping(self, name_or_file: str | None) -> Mapping:
+    def mapping(self, name_or_file: str | None) -> ProjectMapping:
         """Return the mapping of that name in the project's folder `mappings`, or the one in that file.
 
         None stands for the first in the folder, or, if there is none, for the default.
         """
         name_or_file = name_or_file or next(iter(self.mapping_files()), None)
         if name_or_file is None:
-            mapping = Mapping.default(self.configuration)
+            mapping = ProjectMapping.default(self.configuration)
         else:
             mapping = read_mapping(
                 self.mapping_path(name_or_file),
@@ -105,9 +105,9 @@ class ProjectFiles:
         check_places(self.configuration, mapping.callbacks)
         return mapping
 
-    def mappings(self, names_or_files: Sequence[str | None]) -> dict[str, Mapping]:
+    def mappings(self, names_or_files: Sequence[str | None]) -> dict[str, ProjectMapping]:
         """Return these mappings by name, each as `mapping` does; raise UsageError for two of one name."""
-        mappings: dict[str, Mapping] = {}
+        mappings: dict[str, ProjectMapping] = {}
         for name_or_file in names_or_files:
             mapping = self.mapping(name_or_file)
             if mapping.name in mappings:

@@ -11,8 +11,7 @@ from reconros_zenoh.project.communication import gateway_slots
 from reconros_zenoh.toml_file import TomlFile
 
 if TYPE_CHECKING:
-    from collections.abc import Collection
-    from collections.abc import Mapping as Map
+    from collections.abc import Collection, Mapping
     from pathlib import Path
 
     from reconros_zenoh.project.build_cfg import BuildConfiguration, ReconosThread
@@ -29,7 +28,7 @@ class CallbackMapping(BaseModel):
     slots: tuple[StrictInt, ...] = ()
 
 
-class Mapping(BaseModel):
+class ProjectMapping(BaseModel):
     """A mapping of all callbacks of a project.
 
     `executor` is the ReconROS executor or the standard multi-threaded one of ROS 2, which knows software
@@ -86,7 +85,9 @@ def built_for(configuration: BuildConfiguration) -> dict[str, tuple[int, ...]]:
     return {thread.name: thread.slots if thread.hardware else () for thread in configuration.threads}
 
 
-def _no_place(configuration: BuildConfiguration, thread: ReconosThread, taken: Map[int, str]) -> FileError:
+def _no_place(
+    configuration: BuildConfiguration, thread: ReconosThread, taken: Mapping[int, str]
+) -> FileError:
     names = {slot.id: slot.name for slot in configuration.slots}
     holders = " and ".join(f"{names[slot]} is that of {taken[slot]}" for slot in thread.slots)
     return FileError(
@@ -97,7 +98,9 @@ def _no_place(configuration: BuildConfiguration, thread: ReconosThread, taken: M
     )
 
 
-def read_mapping(path: Path, callbacks: Map[str, Collection[int]], slots: Collection[int]) -> Mapping:
+def read_mapping(
+    path: Path, callbacks: Mapping[str, Collection[int]], slots: Collection[int]
+) -> ProjectMapping:
     """Return the mapping in a TOML file, checked against its project.
 
     `callbacks` are the project's callbacks with the ids of the slots that they are built for, `slots` the ids
@@ -108,7 +111,7 @@ def read_mapping(path: Path, callbacks: Map[str, Collection[int]], slots: Collec
         raise FileError(path, toml.line(["name"]), "name: unknown key.", "The file name names the mapping.")
     one_per_slot = 0 if toml.content.get("executor") == "standard" else len(slots)
     try:
-        mapping = Mapping.model_validate(
+        mapping = ProjectMapping.model_validate(
             {"name": path.stem, "hardware_workers": one_per_slot, **toml.content}
         )
     except ValidationError as error:
@@ -134,7 +137,7 @@ def read_mapping(path: Path, callbacks: Map[str, Collection[int]], slots: Collec
     return mapping
 
 
-def _check_workers(toml: TomlFile, mapping: Mapping, slots: Collection[int]) -> None:
+def _check_workers(toml: TomlFile, mapping: ProjectMapping, slots: Collection[int]) -> None:
     if mapping.hardware_workers > len(slots):
         raise FileError(
             toml.path,
@@ -153,7 +156,7 @@ def _check_workers(toml: TomlFile, mapping: Mapping, slots: Collection[int]) -> 
 
 
 def _check_callback(
-    toml: TomlFile, mapping: Mapping, name: str, slots: Collection[int], built_for: Collection[int]
+    toml: TomlFile, mapping: ProjectMapping, name: str, slots: Collection[int], built_for: Collection[int]
 ) -> None:
     callback = mapping.callbacks[name]
 
@@ -185,19 +188,13 @@ def _check_callback(
             f"The callback {name} is mapped to slots, but the standard executor knows only software.",
             'Use `executor = "reconros"` or take the slots away.',
         )
-    if callback.slots and mapping.hardware_workers == 0:
-        raise error(
-            ["slots"],
-            f"The callback {name} is mapped to slots, but there are 0 hardware workers.",
-            "Raise `hardware_workers`.",
-        )
     served = sorted(slots)[: mapping.hardware_workers]
     unserved = [slot for slot in callback.slots if slot not in served]
     if unserved:
         raise error(
             ["slots"],
             f"The callback {name} is mapped to slot {unserved[0]}, which no hardware worker serves; "
-            f"they serve {', '.join(map(str, served))}.",
+            f"they serve {', '.join(map(str, served)) or 'none'}.",
             "Raise `hardware_workers`.",
         )
     if callback.software and mapping.software_workers == 0:
@@ -212,7 +209,9 @@ def _schema_error(toml: TomlFile, error: ValidationError) -> FileError:
     first = error.errors()[0]
     place = [str(key) for key in first["loc"]]
     if first["type"] == "extra_forbidden":
-        known = CallbackMapping.model_fields if len(place) > 1 else Mapping.model_fields.keys() - {"name"}
+        known = (
+            CallbackMapping.model_fields if len(place) > 1 else ProjectMapping.model_fields.keys() - {"name"}
+        )
         return FileError(
             toml.path,
             toml.line(place),

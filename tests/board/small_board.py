@@ -115,6 +115,11 @@ def small_profile(
     return Profile.model_validate({"name": "small", "description": "", "model": model})
 
 
+def transferred_bytes(board: Board) -> int:
+    """What has crossed the MEMIF of a small board, which moves 1 B/ns."""
+    return round(board.memif.bus.use(duration_ns=1))
+
+
 def start(environment: VirtualEnvironment, steps: Steps) -> simpy.Event:
     """Begin to go through the steps now; the event happens, with what they return or raise, when they end."""
     end = environment.event()

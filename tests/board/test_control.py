@@ -343,16 +343,19 @@ def test_the_status_of_a_board_that_answers(monkeypatch: pytest.MonkeyPatch) -> 
         b"\x81\x90\x01",
         msgpack.packb([1]),
         msgpack.packb({"version": 1}),
+        msgpack.packb({name: told for name, told in status(*board_that_ran()).items() if name != "use"}),
         msgpack.packb({**status(*board_that_ran()), "slots": {}}),
         msgpack.packb({**status(*board_that_ran()), "rejected": {"a": "b"}}),
         msgpack.packb({**status(*board_that_ran()), "profile": "\x1b]0;mine\x07"}),
         msgpack.packb({**status(*board_that_ran()), "rejected": {"\x1b[2J": 1}}),
         msgpack.packb({**status(*board_that_ran()), "more": bytes(10_000_000)}),
     ],
-    ids=range(11),
+    ids=range(12),
 )
 def test_what_is_no_status_is_said_to_be_none(answer: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
-    with pytest.raises(TransportError, match="board 'board0' answers with what is no status"):
+    with pytest.raises(
+        TransportError, match=r"board 'board0' answers with what is no status .* of which version of reconros"
+    ):
         ask(Reply(memoryview(answer), None, None), monkeypatch)
 
 
@@ -379,7 +382,7 @@ def test_a_board_that_does_not_answer_is_not_taken_for_one_that_is_not_there(
 
 
 def test_a_board_of_another_version(monkeypatch: pytest.MonkeyPatch) -> None:
-    with pytest.raises(TransportError, match="'board0' speaks version 2 of the status, not 1"):
+    with pytest.raises(TransportError, match=r"'board0' speaks version 2 of the status, not 1\. Ask"):
         ask(packed({"version": 2}), monkeypatch)
 
 

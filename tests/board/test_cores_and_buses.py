@@ -74,7 +74,6 @@ def test_a_stalled_stack_leaves_the_cores_to_threads(environment: VirtualEnviron
 def test_a_transfer_takes_its_bytes_over_the_bandwidth(environment: VirtualEnvironment) -> None:
     memif = Memif(environment, 0.4)
     assert ends(environment, [memif.transfer(921_600)]) == [2_304_000]
-    assert memif.transferred_bytes == 921_600
 
 
 def test_transfers_that_overlap_share_the_bandwidth(environment: VirtualEnvironment) -> None:
@@ -84,13 +83,11 @@ def test_transfers_that_overlap_share_the_bandwidth(environment: VirtualEnvironm
         30_000,
         40_000,
     ]
-    assert memif.transferred_bytes == 16_000
 
 
 def test_a_memory_interface_that_is_not_modelled_takes_no_time(environment: VirtualEnvironment) -> None:
     memif = Memif(environment, None)
     assert ends(environment, [memif.transfer(921_600)]) == [0]
-    assert memif.transferred_bytes == 921_600
 
 
 def test_a_call_takes_core_time_of_its_delegate(environment: VirtualEnvironment) -> None:
@@ -98,4 +95,3 @@ def test_a_call_takes_core_time_of_its_delegate(environment: VirtualEnvironment)
     osif = Osif(cpu, 10)
     # The delegate is a thread like any other: it shares the core with a callback.
     assert ends(environment, [osif.call(), cpu.run(100)]) == [20, 110]
-    assert osif.calls == 1

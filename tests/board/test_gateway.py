@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
-from small_board import desktop, small_board, small_profile, start, types
+from small_board import desktop, small_board, small_profile, start, transferred_bytes, types
 
 from reconros_zenoh.board.control import gateways
 from reconros_zenoh.board.hmt import Fifo, FifoPlan
@@ -117,7 +117,7 @@ def test_from_hardware_a_message_is_streamed_to_all_and_written_to_memory_once(s
         for name, stages_ms in side.board.spans.mean_ms().items()
     }
     assert parts_ns == {"": {"hmt": U}, "/bridge": {"gateway": C, "dds": A + D}}
-    assert side.board.memif.transferred_bytes == U
+    assert transferred_bytes(side.board) == U
 
 
 @pytest.mark.parametrize("subscribers", [1, 4])
@@ -128,7 +128,7 @@ def test_from_software_it_is_read_from_memory_once_while_it_is_streamed(subscrib
     side.environment.run()
     assert [times_of(heard, body) for heard in side.hardware] == [[A + K * U + D + U + G]] * subscribers
     assert times_of(side.software, body) == [A + K * U + E + L * U]
-    assert side.board.memif.transferred_bytes == U
+    assert transferred_bytes(side.board) == U
 
 
 def test_a_message_between_request_and_cancel_is_forwarded() -> None:

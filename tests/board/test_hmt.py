@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import msgpack
 import numpy as np
 import pytest
-from small_board import Tickets, desktop, ignore, small_board, small_profile, start, types
+from small_board import Tickets, desktop, ignore, small_board, small_profile, start, transferred_bytes, types
 
 from reconros_zenoh.board.board import Board
 from reconros_zenoh.board.control import status
@@ -198,7 +198,7 @@ def test_a_kernel_between_two_streams_costs_no_memif() -> None:
     # The first stream did not copy it, because the test published it; the second had to.
     assert streamed.message.data.tolist() == body.data.tolist()
     assert streamed.message.data is not body.data
-    assert board.memif.transferred_bytes == 0
+    assert transferred_bytes(board) == 0
     # 100 ns on one stream, 1000 to load the slot, 100 on the other
     assert board.spans.mean_ms()["relay"] == pytest.approx(
         {"hmt": 0.0001, "dispatch": 0, "reconfiguration": 0.001, "osif": 0}
@@ -256,7 +256,7 @@ def test_a_kernel_at_a_software_mapped_topic_pays_the_memif_for_the_same_lines()
     executor.spin()
     tickets.put(message(100))
     board.environment.run()
-    assert board.memif.transferred_bytes == 100 - HEADER
+    assert transferred_bytes(board) == 100 - HEADER
 
 
 def test_a_bad_message_is_counted_logged_once_per_callback_and_its_place_is_free_again(
@@ -346,7 +346,7 @@ def test_pointers_and_plain_kernels_work_on_a_stream_as_well() -> None:
     board.environment.run()
     assert walked[0].tolist() == body.data.tolist()
     assert arrived.take().message.data.tolist() == (2 * body.data).tolist()
-    assert board.memif.transferred_bytes == 0
+    assert transferred_bytes(board) == 0
     assert executor.failures == {}
 
 
@@ -366,7 +366,7 @@ def read_bytes(source: Any) -> int:
     start(board.environment, topic.publish("p", body, size_of(body), Timeline(board.environment, 0)))
     board.environment.run()
     assert (executor.calls, executor.failures) == ({"reader": 1}, {})
-    return board.memif.transferred_bytes
+    return transferred_bytes(board)
 
 
 def block_of(hardware: Any, init: Any) -> int:

@@ -175,8 +175,6 @@ def test_a_subscriber_in_hardware_with_an_empty_slot_and_then_with_its_bitstream
     slot = itx.board.slots[0]
     assert (slot.reconfigurations, slot.reconfiguring.ns) == (1, INTO_SLOT_0_NS)
     assert slot.busy.ns == 2 * (330_000 + 20_000 + 20)
-    assert itx.board.memif.transferred_bytes == 16
-    assert itx.board.osif.calls == 4
 
 
 def test_a_subscriber_in_software() -> None:

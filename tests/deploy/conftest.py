@@ -8,7 +8,7 @@ import psutil
 import pytest
 from ruamel.yaml import YAML
 
-from deploy.compose import Condition, Deployment, Healthcheck, Service
+from deploy.compose import ComposeService, Deployment, Healthcheck, StartCondition
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -37,20 +37,20 @@ class Services:
 
     def service(
         self, name: str, code: str, healthcheck: Healthcheck | None = None, **depends_on: str
-    ) -> Service:
+    ) -> ComposeService:
         """Return a service that runs the code, in which `write(name, text)` and `block()` are known."""
         program = PRELUDE.format(folder=str(self.folder), name=name) + code
-        conditions = {other: Condition(f"service_{word}") for other, word in depends_on.items()}
-        return Service(name, ("python", "-c", program), {}, conditions, healthcheck)
+        conditions = {other: StartCondition(f"service_{word}") for other, word in depends_on.items()}
+        return ComposeService(name, ("python", "-c", program), {}, conditions, healthcheck)
 
     def when_written(self, name: str) -> Healthcheck:
         """Return the healthcheck of a service that is healthy as soon as it has written the file."""
         return Healthcheck(("test", "-e", str(self.folder / name)), OFTEN_NS, retries=PATIENT)
 
-    def deployment(self, *services: Service) -> Deployment:
+    def deployment(self, *services: ComposeService) -> Deployment:
         return Deployment(self.folder / "compose.yaml", {service.name: service for service in services})
 
-    def compose_file(self, *services: Service) -> Path:
+    def compose_file(self, *services: ComposeService) -> Path:
         """Write the services as a Compose file."""
         content: dict[str, dict[str, object]] = {}
         for service in services:

@@ -11,9 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import deploy
-from deploy.compose import Condition, Deployment, Healthcheck, Service, duration_ns, read_compose
+from deploy.compose import ComposeService, Deployment, Healthcheck, StartCondition, duration_ns, read_compose
 from reconros_zenoh.errors import FileError
-from reconros_zenoh.yaml_node import Node
+from reconros_zenoh.yaml_node import YamlNode
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -75,7 +75,7 @@ def test_everything_that_is_supported(read: Callable[..., Deployment], tmp_path:
     assert read(COMPLETE, **ENVIRONMENT) == Deployment(
         path=tmp_path / "compose.yaml",
         services={
-            "router": Service(
+            "router": ComposeService(
                 "router",
                 ("reconros", "router", "--name", "r1", "$HOME"),
                 {"MODE": "fast", "INHERITED": "from outside"},
@@ -88,18 +88,18 @@ def test_everything_that_is_supported(read: Callable[..., Deployment], tmp_path:
                     start_period_ns=500 * 10**6,
                 ),
             ),
-            "board": Service(
+            "board": ComposeService(
                 "board",
                 ("python3", "-c", "print(1)"),
                 {"COUNT": "3", "RATE": "0.5", "INHERITED": "from outside", "EMPTY": ""},
-                {"router": Condition.STARTED},
+                {"router": StartCondition.STARTED},
                 Healthcheck(("/bin/sh", "-c", "test -e ready"), 30 * 10**9, 30 * 10**9, 3, 0),
             ),
-            "client": Service(
+            "client": ComposeService(
                 "client",
                 ("client",),
                 {},
-                {"router": Condition.HEALTHY, "board": Condition.COMPLETED},
+                {"router": StartCondition.HEALTHY, "board": StartCondition.COMPLETED},
                 Healthcheck(("/bin/sh", "-c", "exit 0"), retries=2),
             ),
         },
@@ -253,7 +253,7 @@ def test_exactly_the_circles_are_refused(
 
 
 def _replaced(text: str, environment: dict[str, str]) -> str:
-    return Node(text, "value", 1, Path("file"), environment).text()
+    return YamlNode(text, "value", 1, Path("file"), environment).text()
 
 
 @given(st.text())

@@ -15,7 +15,7 @@ import psutil
 import pytest
 
 from deploy.child import local_command
-from deploy.compose import Healthcheck, Service
+from deploy.compose import ComposeService, Healthcheck
 from deploy.runner import LocalRunner
 from deploy.service_run import ServiceState
 from reconros_zenoh.errors import ExperimentError, FileError, UsageError
@@ -29,7 +29,7 @@ NEVER_S = 10**6
 class Recorder:
     """A runner whose events are kept."""
 
-    def __init__(self, services: Services, *members: Service, stop_limit_s: float = NEVER_S) -> None:
+    def __init__(self, services: Services, *members: ComposeService, stop_limit_s: float = NEVER_S) -> None:
         self.events: list[tuple[str, str]] = []
         self.logs = services.folder / "logs"
         self.runner = LocalRunner(
@@ -104,7 +104,9 @@ def test_run_until_leaves_the_others_running(services: Services) -> None:
     assert runner.states["server"] is ServiceState.STOPPED
 
 
-def _failure(services: Services, *members: Service, until: set[str] | None = None) -> tuple[str, Recorder]:
+def _failure(
+    services: Services, *members: ComposeService, until: set[str] | None = None
+) -> tuple[str, Recorder]:
     """Run the services until one fails; check that none is left and return the message."""
     record = Recorder(services, *members)
     with record.runner as runner, pytest.raises(ExperimentError) as caught:
@@ -149,7 +151,7 @@ def test_a_server_may_not_end_even_with_status_0(services: Services) -> None:
 
 
 def test_a_program_that_cannot_be_started(services: Services) -> None:
-    record = Recorder(services, Service("typo", ("no-such-program", "x")))
+    record = Recorder(services, ComposeService("typo", ("no-such-program", "x")))
     with (
         pytest.raises(ExperimentError, match="typo ended with status 127") as caught,
         record.runner as runner,
@@ -274,7 +276,7 @@ def test_logs_of_the_last_run_are_emptied_and_a_wrong_folder_is_told(services: S
 def test_services_see_their_environment(services: Services) -> None:
     show = services.service("show", "print(os.environ['GIVEN'], os.environ['BASE'], sys.executable)")
     show = replace(show, environment={"GIVEN": "own"})
-    shell = Service("shell", ("sh", "-c", "command -v python"))
+    shell = ComposeService("shell", ("sh", "-c", "command -v python"))
     environment = {"GIVEN": "outer", "BASE": "base", "PATH": os.environ["PATH"]}
     logs = services.folder / "logs"
     with LocalRunner(services.deployment(show, shell), logs, environment) as runner:

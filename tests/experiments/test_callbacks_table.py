@@ -15,6 +15,7 @@ from reconros_zenoh.errors import ExperimentError, UsageError
 from reconros_zenoh.experiments import callbacks
 from reconros_zenoh.experiments.callbacks import TABLE_I, measure_callbacks, run_alone
 from reconros_zenoh.experiments.roundtrip import application_folder
+from reconros_zenoh.mapping.graph import Side
 from reconros_zenoh.project.loader import load_project
 
 PROFILE = "miniitx-zynq7100"
@@ -104,7 +105,7 @@ def test_another_interface_changes_the_split() -> None:
         memif={"bandwidth": model["memif"]["bandwidth"] | {"value": 100}},
         osif={"call": model["osif"]["call"] | {"value": 1, "unit": "ms"}},
     )
-    alone = run_alone("virtual", slow, load_project(application_folder()), "sort", "hardware", 1)
+    alone = run_alone("virtual", slow, load_project(application_folder()), "sort", Side.HARDWARE, 1)
     assert alone.stages_ms["memif"] == pytest.approx(2 * 8192 / 0.1 / 1e6)
     assert alone.stages_ms["osif"] == pytest.approx(2.0)
 
@@ -112,7 +113,7 @@ def test_another_interface_changes_the_split() -> None:
 def test_nothing_else_runs() -> None:
     """The hash calculation, which would share memory and cores, is not even registered."""
     project = load_project(application_folder())
-    for place in ("hardware", "software"):
+    for place in Side:
         few = run_alone("virtual", read_profile(PROFILE), project, "sobel", place, 1)
         many = run_alone("virtual", read_profile(PROFILE), project, "sobel", place, 9)
         for stage in ("execution", "memif", "osif"):
@@ -122,12 +123,14 @@ def test_nothing_else_runs() -> None:
 def test_a_wrong_answer_ends_the_experiment(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("host_clients.sort.SortExchange.is_right", lambda *_: False)
     with pytest.raises(ExperimentError, match="callback 'sort' in hardware was wrong"):
-        run_alone("virtual", read_profile(PROFILE), load_project(application_folder()), "sort", "hardware", 1)
+        run_alone(
+            "virtual", read_profile(PROFILE), load_project(application_folder()), "sort", Side.HARDWARE, 1
+        )
 
 
 def test_wall_time_adds_what_the_host_took() -> None:
     alone = run_alone(
-        "wall", read_profile(PROFILE), load_project(application_folder()), "sort", "hardware", 3
+        "wall", read_profile(PROFILE), load_project(application_folder()), "sort", Side.HARDWARE, 3
     )
     assert (len(alone.elapsed_ms), len(alone.kernel_ms)) == (3, 3)
     assert min(*alone.elapsed_ms, *alone.kernel_ms) > 0

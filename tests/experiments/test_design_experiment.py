@@ -14,7 +14,6 @@ import typer
 from PIL import Image
 from typer.testing import CliRunner
 
-from board_daemon.hosting import BoardOptions
 from host_clients.camera import CameraOptions
 from host_clients.gallery import Gallery
 from reconros_zenoh.applications.design_example.control.plant import SETPOINT
@@ -28,6 +27,7 @@ from reconros_zenoh.errors import TransportError, UsageError
 from reconros_zenoh.experiments import design_virtual
 from reconros_zenoh.experiments.design import projects_folder
 from reconros_zenoh.experiments.simulation import Simulation
+from reconros_zenoh.project.hosting import BoardOptions
 from reconros_zenoh.project.loader import load_project
 
 if TYPE_CHECKING:

@@ -14,7 +14,6 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from board_daemon.hosting import BoardOptions
 from host_clients.robot import RobotOptions, Step, stood_s
 from reconros_zenoh.applications.driving.nodes import check_picture
 from reconros_zenoh.applications.driving.world import RED_S, Robot, World
@@ -38,6 +37,7 @@ from reconros_zenoh.mapping.communication import Crossings, map_topics
 from reconros_zenoh.mapping.project_graph import read_project_graph
 from reconros_zenoh.measure.driving_plots import driving_figure
 from reconros_zenoh.measure.record import find_records, read_record, short_names
+from reconros_zenoh.project.hosting import BoardOptions
 from reconros_zenoh.project.loader import load_project, read_project
 from reconros_zenoh.ros.image import image_message
 from reconros_zenoh.ros.types import TypeRegistry
@@ -46,7 +46,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
-    from board_daemon.hosting import HostedBoard
+    from reconros_zenoh.project.hosting import HostedBoard
 
 PICTURES = 70
 PROFILE = read_profile("zcu104")

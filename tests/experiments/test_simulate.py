@@ -13,7 +13,6 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from board_daemon.hosting import BoardOptions
 from host_clients.daemon import ClientOptions
 from reconros_zenoh.board.answers import StatusAnswer
 from reconros_zenoh.board.profile import read_profile
@@ -23,6 +22,7 @@ from reconros_zenoh.errors import FileError, TransportError, UsageError
 from reconros_zenoh.experiments.deployment import DeploymentRun
 from reconros_zenoh.experiments.roundtrip import application_folder
 from reconros_zenoh.experiments.simulation import Simulation
+from reconros_zenoh.project.hosting import BoardOptions
 from reconros_zenoh.project.loader import load_project
 
 if TYPE_CHECKING:

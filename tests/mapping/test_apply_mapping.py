@@ -13,7 +13,7 @@ from reconros_zenoh.mapping.apply import apply_mapping
 from reconros_zenoh.mapping.communication import map_topics
 from reconros_zenoh.mapping.project_graph import read_project_graph
 from reconros_zenoh.project.build_cfg import read_build_cfg
-from reconros_zenoh.project.mapping_file import Mapping
+from reconros_zenoh.project.mapping_file import ProjectMapping
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -33,7 +33,7 @@ for before, after in CHANGED.items():
 
 def apply_rule(path: Path) -> list[str]:
     configuration = read_build_cfg(path)
-    mapping = Mapping.default(configuration)
+    mapping = ProjectMapping.default(configuration)
     decisions = map_topics(read_project_graph(configuration, mapping))
     return apply_mapping(configuration, mapping, {name: each.mapping for name, each in decisions.items()})
 
@@ -58,10 +58,10 @@ def test_only_what_has_to_change_changes(tmp_path: Path) -> None:
 
 def test_what_was_written_is_what_was_meant(tmp_path: Path) -> None:
     before = read(tmp_path)
-    graph = read_project_graph(before, Mapping.default(before))
+    graph = read_project_graph(before, ProjectMapping.default(before))
     apply_rule(before.path)
     after = read_build_cfg(before.path)
-    assert read_project_graph(after, Mapping.default(after)) == graph
+    assert read_project_graph(after, ProjectMapping.default(after)) == graph
     assert {(r.group, r.name) for r in after.resources if r.hardware_mapped} == {
         ("edge", "sub"),
         ("edge", "pub"),

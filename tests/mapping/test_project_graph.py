@@ -13,7 +13,7 @@ from reconros_zenoh.mapping.communication import TopicMapping, map_topics
 from reconros_zenoh.mapping.graph import ComputationGraph, Side, Topic
 from reconros_zenoh.mapping.project_graph import OUTSIDE, read_project_graph, shared_slots
 from reconros_zenoh.project.loader import load_project
-from reconros_zenoh.project.mapping_file import CallbackMapping, Mapping
+from reconros_zenoh.project.mapping_file import CallbackMapping, ProjectMapping
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -25,7 +25,7 @@ FROM_OUTSIDE, TO_OUTSIDE = OUTSIDE.values()
 def graph_of(folder: Path, text: str = CAMERA) -> ComputationGraph:
     """Return the graph of this project file under the mapping of a project without mapping files."""
     configuration = read(folder, text)
-    return read_project_graph(configuration, Mapping.default(configuration))
+    return read_project_graph(configuration, ProjectMapping.default(configuration))
 
 
 def topics(graph: ComputationGraph) -> dict[str, tuple[str, str]]:
@@ -60,8 +60,8 @@ def test_what_nobody_in_the_project_reads_leaves_it(tmp_path: Path) -> None:
     assert not any("Services" in note for note in graph.notes)
 
 
-def mapping_of(**slots: tuple[int, ...]) -> Mapping:
-    return Mapping(
+def mapping_of(**slots: tuple[int, ...]) -> ProjectMapping:
+    return ProjectMapping(
         name="test",
         executor="reconros",
         software_workers=1,

@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from board_daemon.hosting import BoardOptions, HostedBoard
 from reconros_zenoh.board.profile import read_profile
 from reconros_zenoh.clock.virtual import VirtualEnvironment
 from reconros_zenoh.errors import UsageError
+from reconros_zenoh.project.hosting import BoardOptions, HostedBoard
 from reconros_zenoh.project.loader import load_project
-from reconros_zenoh.project.mapping_file import Mapping
+from reconros_zenoh.project.mapping_file import ProjectMapping
 from reconros_zenoh.rmw.action_client import ActionClient
 from reconros_zenoh.ros.graph import NodeToken, parse
 from reconros_zenoh.ros.qos import QosProfile, Reliability
@@ -72,7 +72,7 @@ def app(tmp_path: Path) -> Application:
         SimulatedNetwork(environment).transport("b0"),
         read_profile("native"),
         load_project(tmp_path),
-        Mapping(name="m", executor="reconros", software_workers=1, hardware_workers=1, callbacks={}),
+        ProjectMapping(name="m", executor="reconros", software_workers=1, hardware_workers=1, callbacks={}),
         BoardOptions(),
     )
     return hosted._application

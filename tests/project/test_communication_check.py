@@ -13,7 +13,7 @@ from networkx.algorithms import bipartite
 from reconros_zenoh.errors import FileError
 from reconros_zenoh.project.build_cfg import read_build_cfg
 from reconros_zenoh.project.communication import check_fifos, check_places, check_topics, gateway_slots
-from reconros_zenoh.project.mapping_file import CallbackMapping, Mapping
+from reconros_zenoh.project.mapping_file import CallbackMapping, ProjectMapping
 from reconros_zenoh.ros.types import TypeRegistry
 
 HEAD = """[HwSlot@slot(0:1)]
@@ -299,6 +299,6 @@ def test_a_gateway_whose_slots_are_none_is_refused(tmp_path) -> None:
 def test_without_a_mapping_file_a_gateway_keeps_its_slot(tmp_path) -> None:
     thread = THREAD.replace("slot(0)", "slot(*)")
     read = configuration(tmp_path, thread + GATEWAY.format("g", "/a", "/b", "sensor_msgs/Image"))
-    mapping = Mapping.default(read)
+    mapping = ProjectMapping.default(read)
     assert mapping.callbacks["t"].slots == (0,)
     check_places(read, mapping.callbacks)

@@ -8,7 +8,7 @@ import pytest
 
 from reconros_zenoh.errors import FileError
 from reconros_zenoh.project.build_cfg import read_build_cfg
-from reconros_zenoh.project.mapping_file import CallbackMapping, Mapping, read_mapping
+from reconros_zenoh.project.mapping_file import CallbackMapping, ProjectMapping, read_mapping
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -26,14 +26,14 @@ slots = [3]
 """
 
 
-def read(tmp_path: Path, text: str) -> Mapping:
+def read(tmp_path: Path, text: str) -> ProjectMapping:
     path = tmp_path / "mine.toml"
     path.write_text(text, encoding="utf-8")
     return read_mapping(path, {"sobel": (2, 3), "hash": (3,)}, (2, 3))
 
 
 def test_a_mapping(tmp_path: Path) -> None:
-    assert read(tmp_path, GOOD) == Mapping(
+    assert read(tmp_path, GOOD) == ProjectMapping(
         name="mine",
         executor="reconros",
         software_workers=2,
@@ -70,7 +70,7 @@ def test_without_a_file_what_can_be_in_hardware_is(tmp_path: Path) -> None:
         "[ReconosThread@nowhere]\nHwSource = hls\n",
         encoding="utf-8",
     )
-    assert Mapping.default(read_build_cfg(path)) == Mapping(
+    assert ProjectMapping.default(read_build_cfg(path)) == ProjectMapping(
         name="default",
         executor="reconros",
         software_workers=2,
@@ -99,7 +99,7 @@ def test_without_a_file_who_has_the_slots_of_a_callback_that_can_be_nowhere_else
         encoding="utf-8",
     )
     with pytest.raises(FileError) as refused:
-        Mapping.default(read_build_cfg(path))
+        ProjectMapping.default(read_build_cfg(path))
     assert refused.value.line == 13
     assert (
         "The callback late has no slot left, and no SwSource: s(0) is that of the gateway g (line 16) and "
@@ -151,7 +151,7 @@ MISTAKES = {
         6,
         "sobel is mapped to slot 3, which no hardware worker serves; they serve 2.",
     ),
-    "no hardware workers": ("hardware_workers = 0\n" + GOOD, 6, "0 hardware workers"),
+    "no hardware workers": ("hardware_workers = 0\n" + GOOD, 6, "no hardware worker serves; they serve none"),
 }
 
 

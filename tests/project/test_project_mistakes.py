@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from board_daemon.hosting import BoardOptions
 from reconros_zenoh.board.profile import read_profile
 from reconros_zenoh.errors import FileError
 from reconros_zenoh.experiments.simulation import Simulation
+from reconros_zenoh.project.hosting import BoardOptions
 from reconros_zenoh.project.loader import load_project
 from reconros_zenoh.project.template import new_project
 

@@ -9,7 +9,7 @@ import pytest
 import reconros_zenoh.applications.roundtrip
 from reconros_zenoh.project.build_cfg import BuildConfiguration, read_build_cfg
 from reconros_zenoh.project.interfaces import read_interfaces
-from reconros_zenoh.project.mapping_file import Mapping, built_for, read_mapping
+from reconros_zenoh.project.mapping_file import ProjectMapping, built_for, read_mapping
 from reconros_zenoh.project.resources import SlotResources, slot_resources
 
 PROJECT = Path(reconros_zenoh.applications.roundtrip.__path__[0])
@@ -20,7 +20,7 @@ def configuration() -> BuildConfiguration:
     return read_build_cfg(PROJECT / "build.cfg")
 
 
-def mapping(configuration: BuildConfiguration, name: str) -> Mapping:
+def mapping(configuration: BuildConfiguration, name: str) -> ProjectMapping:
     return read_mapping(
         PROJECT / "mappings" / f"{name}.toml",
         built_for(configuration),

@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 SUBSCRIBERS = 8
 
 
-class Publisher:
+class ImagePublisher:
     """Publishes an image of random data whenever it is called."""
 
     def __init__(
@@ -77,7 +77,7 @@ class Publisher:
         return self._writer.message(header=header, **image_fields("mono8", self._body[np.newaxis]))
 
 
-class Subscriber:
+class ImageSubscriber:
     """Copies each image into its memory and checks its number and its CRC."""
 
     def __init__(self, environment: VirtualEnvironment, on_received: Callable[[int, int], None]) -> None:
@@ -123,10 +123,10 @@ def run_nodes(
     for name, place in mapping.callbacks.items():
         if not (place.software or place.slots):
             continue
-        callback: Publisher | Subscriber
+        callback: ImagePublisher | ImageSubscriber
         if name.startswith("publisher"):
             kind, source = CallbackKind.TMR, trigger or app.source(name, "tmr")
-            callback = Publisher(
+            callback = ImagePublisher(
                 f"{app.board.name}.{name}",
                 app.writer(name, "pub"),
                 app.types,
@@ -135,7 +135,7 @@ def run_nodes(
             )
         else:
             kind, source = CallbackKind.SUB, app.source(name, "sub")
-            callback = Subscriber(environment, partial(on_received, name))
+            callback = ImageSubscriber(environment, partial(on_received, name))
         if place.software:
             executor.add_sw_callback(name, kind, source, callback.software)
         if place.slots:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from reconros_zenoh.board.profile import Profile
     from reconros_zenoh.clock.virtual import VirtualEnvironment
     from reconros_zenoh.project.loader import Project
-    from reconros_zenoh.project.mapping_file import Mapping
+    from reconros_zenoh.project.mapping_file import ProjectMapping
     from reconros_zenoh.transport.base import Transport
 
 
@@ -56,7 +56,7 @@ class HostedBoard:
         transport: Transport,
         profile: Profile,
         project: Project,
-        mapping: Mapping,
+        mapping: ProjectMapping,
         options: BoardOptions,
         *,
         traced: bool = False,
