@@ -6,7 +6,7 @@ DEMO_OUT ?= results/demo
 .PHONY: demo test lint bench clean
 
 .venv/.installed: pyproject.toml
-	$(PYTHON) -m venv .venv
+	$(PYTHON) -m venv --clear .venv
 	$(BIN)/python -m pip install --quiet --upgrade pip
 	PYTHONWARNINGS=ignore $(BIN)/python -m pip install --quiet --editable '.[test]'
 	touch $@

@@ -5,7 +5,6 @@ Each has a connection to the process that measures, and ends when nobody holds t
 
 from __future__ import annotations
 
-import signal
 import threading
 import time
 import zlib
@@ -85,7 +84,7 @@ def _receipt(name: str, image: Any, now_ns: int) -> Receipt:
 
 def run_board(connection: Connection, router: str, variant: Variant, count: int) -> None:
     """Be the board with so many hardware nodes."""
-    begin_process()
+    tune_process()
     environment = WallEnvironment()
     stop = environment.event()
     receiver = Receiver(connection, count)
@@ -145,7 +144,7 @@ def _hardware_node(
 
 def run_listener(connection: Connection, router: str) -> None:
     """Be the software subscriber."""
-    begin_process()
+    tune_process()
     receiver = Receiver(connection, 1)
     with ZenohTransport.open(router) as transport:
         Context(transport).node("software").subscription(
@@ -160,7 +159,7 @@ def run_listener(connection: Connection, router: str) -> None:
 
 def run_publisher(connection: Connection, router: str, size: int) -> None:
     """Publish an image of so many bytes whenever its number is sent."""
-    begin_process()
+    tune_process()
     types = TypeRegistry()
     body = random_body(size)
     crc = zlib.crc32(body.data)
@@ -171,12 +170,6 @@ def run_publisher(connection: Connection, router: str, size: int) -> None:
             image.header.frame_id = f"{number} {crc:08x}"
             set_stamp(image.header.stamp, time.monotonic_ns())
             publisher.publish(image)
-
-
-def begin_process() -> None:
-    """Make this process punctual, and leave Ctrl-C to the one that started it."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C ends the experiment, and that its processes
-    tune_process()
 
 
 def commands(connection: Connection) -> Iterator[Any]:

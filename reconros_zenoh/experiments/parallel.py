@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import signal
 import threading
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
@@ -13,6 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple, Self
 import numpy as np
 
 from reconros_zenoh.errors import ExperimentError
+from reconros_zenoh.experiments.interruption import sigint_blocked
 from reconros_zenoh.experiments.roundtrip import CLIENTS
 from reconros_zenoh.experiments.virtual import run_mapping
 from reconros_zenoh.measure.record import Record
@@ -42,7 +42,7 @@ class ParallelRuns:
     """
 
     def __enter__(self) -> Self:
-        self._pool = ProcessPoolExecutor(os.cpu_count(), get_context("spawn"), _begin_process)
+        self._pool = ProcessPoolExecutor(os.cpu_count(), get_context("spawn"), _end_with_parent)
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -54,7 +54,9 @@ class ParallelRuns:
         Raise ExperimentError if a process was ended from outside.
         """
         try:
-            yield from self._pool.map(records_of, runs)
+            with sigint_blocked():
+                records = self._pool.map(records_of, runs)
+            yield from records
         except BrokenProcessPool:
             raise ExperimentError(
                 "a process of the simulation was ended from outside. Was there memory enough? Run it again."
@@ -74,17 +76,16 @@ def pooled(records: Sequence[Mapping[str, Record]]) -> dict[str, Record]:
     }
 
 
-def _begin_process() -> None:
-    """Leave Ctrl-C to the process that gives the work, and end with it even when it is killed."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threading.Thread(target=_end_with_parent, daemon=True).start()
-
-
 def _end_with_parent() -> None:
+    """End with the process that gives the work, even when it is killed."""
     parent = parent_process()
     assert parent is not None
-    parent.join()
-    os._exit(1)
+
+    def wait() -> None:
+        parent.join()
+        os._exit(1)
+
+    threading.Thread(target=wait, daemon=True).start()
 
 
 def records_of(run: Run) -> dict[str, Record]:

@@ -20,9 +20,10 @@ from overhead import raw_session
 from table import arguments, free_port, print_result
 
 from reconros_zenoh.applications.gateway.nodes import random_body
+from reconros_zenoh.clock.process import tune_process
 from reconros_zenoh.experiments.gateway import COUNTS, SIZES
 from reconros_zenoh.experiments.gateway_native import Setup, copies, native_setup, take_turns
-from reconros_zenoh.experiments.gateway_processes import Receiver, begin_process, commands
+from reconros_zenoh.experiments.gateway_processes import Receiver, commands
 from reconros_zenoh.transport.zenoh import ZenohRouter
 
 if TYPE_CHECKING:
@@ -34,7 +35,7 @@ KEY = "raw/a"
 
 def raw_subscribers(connection: Connection, router: str, names: list[str]) -> None:
     """Receive with one subscription per name, each of which copies the payload."""
-    begin_process()
+    tune_process()
     receiver = Receiver(connection, len(names))
 
     def on_sample(name: str, sample: zenoh.Sample) -> None:
@@ -55,7 +56,7 @@ def raw_subscribers(connection: Connection, router: str, names: list[str]) -> No
 
 def raw_publisher(connection: Connection, router: str, size: int) -> None:
     """Publish the message whose number is asked for."""
-    begin_process()
+    tune_process()
     body = random_body(size).tobytes()
     crc = zlib.crc32(body)
     with raw_session(router) as session:

@@ -74,6 +74,7 @@ class Intruder:
     def run(self, function: Callable[..., object], *arguments: object) -> None:
         """Call the function in between whose instructions the intruder posts."""
         before = sys.gettrace()
+        sys._getframe().f_trace_opcodes = True  # CPython 3.12 traces none unless asked before settrace
         sys.settrace(self.trace)
         try:
             function(*arguments)

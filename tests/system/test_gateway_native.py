@@ -8,13 +8,14 @@ import multiprocessing
 import subprocess
 import sys
 from contextlib import ExitStack
+from signal import SIG_BLOCK, SIGINT, pthread_sigmask
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
 
 from reconros_zenoh.errors import ExperimentError
-from reconros_zenoh.experiments.gateway_native import Setup, take_turns
+from reconros_zenoh.experiments.gateway_native import Setup, _process, take_turns
 from reconros_zenoh.experiments.gateway_processes import Receiver
 
 if TYPE_CHECKING:
@@ -78,6 +79,15 @@ def test_a_receiver_reports_when_all_its_readers_have_a_message_and_checks_the_b
     assert here.recv()
     receiver.check()
     assert here.recv() == "2 of 2 messages came with other bytes."
+
+
+def tell_signal_mask(connection: Connection) -> None:
+    connection.send(pthread_sigmask(SIG_BLOCK, ()))
+
+
+def test_its_processes_leave_ctrl_c_to_the_experiment() -> None:
+    with _process((tell_signal_mask, ())) as connection:
+        assert SIGINT in connection.recv()
 
 
 def test_too_many_lost_messages_end_the_experiment() -> None:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from signal import SIGINT, SIGKILL, SIGTERM, Signals
+import subprocess
+import sys
+from signal import SIG_BLOCK, SIGINT, SIGKILL, SIGTERM, Signals, pthread_sigmask
 
 import psutil
 import pytest
@@ -35,6 +37,33 @@ def test_no_process_outlives_the_one_that_started_it(number: Signals) -> None:
         assert len(children) >= 2
         process.end(number)
         assert not psutil.wait_procs(children, timeout=LIMIT_S)[1]
+
+
+INTERRUPTED_AS_IT_STARTS = """
+import os, signal
+from multiprocessing import get_context
+from reconros_zenoh.experiments.interruption import sigint_blocked
+
+with sigint_blocked():
+    process = get_context("spawn").Process(target=abs, args=(1,))
+    process.start()
+os.kill(process.pid, signal.SIGINT)
+process.join()
+print(process.exitcode, signal.pthread_sigmask(signal.SIG_BLOCK, ()))
+"""
+
+
+def test_a_process_does_not_hear_ctrl_c_while_it_starts() -> None:
+    command = [sys.executable, "-c", INTERRUPTED_AS_IT_STARTS]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=LIMIT_S)
+    assert (done.stdout, done.stderr) == ("0 set()\n", "")
+
+
+def test_processes_that_make_runs_leave_ctrl_c_to_the_one_that_started_them() -> None:
+    mapping = application_folder() / "mappings" / "mixed.toml"
+    with ParallelRuns() as parallel:
+        list(parallel.records([Run(read_profile("miniitx-zynq7100"), mapping, 1, 0)]))
+        assert SIGINT in parallel._pool.submit(pthread_sigmask, SIG_BLOCK, ()).result()
 
 
 def test_a_mistake_in_a_run_is_told_as_what_it_is() -> None:
