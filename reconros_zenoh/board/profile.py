@@ -46,7 +46,11 @@ class CoresSection(_Section):
 
 
 class FabricSection(_Section):
-    """The reconfigurable part: the clock of hardware threads whose slot declares none."""
+    """The reconfigurable part.
+
+    `thread_clock` is the clock of hardware threads at which the `compute` times of callbacks hold, and that
+    of slots which declare none.
+    """
 
     thread_clock: Frequency
 
@@ -166,8 +170,8 @@ class BitstreamSection(_Section):
 class CallbackSection(_Section):
     """How long a callback takes in isolation.
 
-    `software` is processor time. `compute` is what the slot computes; with the memory transfers and the calls
-    of the hardware thread it adds up to the execution time in hardware.
+    `software` is processor time. `compute` is what a slot at `thread_clock` computes; with the memory
+    transfers and the calls of the hardware thread it adds up to the execution time in hardware.
     """
 
     software: Duration

@@ -60,12 +60,16 @@ def software_time(profile: Profile, callback: str, timing: Timing | None) -> Exe
 
 
 def hardware_time(profile: Profile, callback: str, timing: Timing | None, clock_hz: float) -> ExecutionTime:
-    """Return how long a slot with this clock computes; raise UsageError when nothing says it."""
+    """Return how long a slot with this clock computes; raise UsageError when nothing says it.
+
+    The table's time holds at the profile's `thread_clock`: a slot at half of it takes twice as long.
+    """
     if profile.model is None:
         return None
     if timing is not None:
         return _declared(timing, clock_hz)
-    return FixedTime("table", _table(profile, callback, "hardware").compute.ns)
+    table_ns = _table(profile, callback, "hardware").compute.ns
+    return FixedTime("table", round(table_ns * profile.model.fabric.thread_clock.hz / clock_hz))
 
 
 def cycles_ns(count: int, clock_hz: float) -> int:

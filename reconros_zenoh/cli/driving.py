@@ -119,5 +119,11 @@ def _print(console: Console, experiment: dict[str, Any], troubles: list[str]) ->
     for anchor in experiment["anchors"]:
         error = format_error(anchor["error"])
         console.print(f"{anchor['name']}: {anchor['ours']:.2f}, paper {anchor['paper']:.2f} ({error})")
+    speedup = experiment["speedup_of_all"]
+    if speedup["ours"] is not None:
+        console.print(
+            f"speedup by streams and gateway: {speedup['ours']:.2f}; of an earlier application, with other "
+            f"nodes, the paper quotes {speedup['paper_earlier_application']}"
+        )
     for trouble in troubles:
         console.print(Text(trouble, style="yellow"))

@@ -45,6 +45,10 @@ SECTIONS = tuple(f"{here} to {there}" for here, there in pairwise(STATIONS))
 _PAPER_MS = {"hardware_topics": (28.264, 3.21), "gateways": (20.270, 0.239)}
 """Mean and standard deviation of the chain."""
 
+_EARLIER_SPEEDUP = 2.48
+"""By hardware-mapped topics over standard ROS 2, as Section 6 quotes it of the application's first version,
+whose chain has other nodes: no anchor."""
+
 _REACTION_S = 0.5
 
 FILES = ("chain.csv", "robot.csv", "pictures.tsv")
@@ -104,13 +108,20 @@ def summary(
     profile: Profile, pictures: int, drives: Mapping[str, Drive], *, interrupted: bool
 ) -> dict[str, Any]:
     """Return the experiment's object."""
+    means_ms = {name: statistics.fmean(drive.chain_ms) for name, drive in drives.items()}
     return {
         "experiment": "driving",
         "clock": "virtual",
         "profile": profile.name,
         "pictures": pictures,
         "variants": {name: _variant(name, drive) for name, drive in drives.items()},
-        "anchors": anchors({name: statistics.fmean(drive.chain_ms) for name, drive in drives.items()}),
+        "anchors": anchors(means_ms),
+        "speedup_of_all": {
+            "paper_earlier_application": _EARLIER_SPEEDUP,
+            "ours": means_ms["all_software"] / means_ms["gateways"]
+            if len(means_ms) == len(VARIANTS)
+            else None,
+        },
         "interrupted": interrupted,
         **provenance(),
         "machine": machine(),

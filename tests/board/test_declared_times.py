@@ -64,6 +64,11 @@ def test_the_table_of_the_profile() -> None:
     assert software_ns(small_board(PROFILE), None, name="table") == 100
 
 
+def test_the_table_holds_at_the_profiles_clock_of_hardware_threads() -> None:
+    assert hardware_ns(board_with_slot(None), None, name="table") == 200
+    assert hardware_ns(board_with_slot(500_000_000), None, name="table") == 400
+
+
 def test_what_is_declared_goes_before_the_table() -> None:
     assert hardware_ns(small_board(PROFILE, 1), Cycles(70), name="table") == 70
     assert software_ns(small_board(PROFILE), Cycles(60), name="table") == 60

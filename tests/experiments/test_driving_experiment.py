@@ -324,6 +324,18 @@ def test_a_robot_that_comes_when_the_last_one_stood_at_the_light_drives() -> Non
     assert second.unexpected == 0
 
 
+def test_what_streams_and_gateway_are_worth_together_stands_beside_what_the_paper_quotes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    paper, ours = experiment()["speedup_of_all"].values()
+    assert (paper, ours) == (2.48, pytest.approx(30.79 / 19.32, rel=0.01))
+    partly = summary(PROFILE, PICTURES, {"all_software": drive("all_software")}, interrupted=True)
+    assert partly["speedup_of_all"]["ours"] is None
+    monkeypatch.setattr(driving, "run_variant", lambda _, variant, __: drive(variant))
+    done = CliRunner().invoke(app, ["driving", "--pictures", str(PICTURES), "--out", str(tmp_path)])
+    assert f"speedup by streams and gateway: {ours:.2f}" in done.stdout
+
+
 def test_anchors_need_their_variants() -> None:
     assert anchors({}) == []
     assert [anchor["name"] for anchor in anchors({"gateways": 20.0})] == ["chain, gateways [ms]"]

@@ -94,6 +94,7 @@ def test_the_tables_hold_the_figures_beside_the_real_boards(tmp_path, board_reco
     (speedups,) = [row for row in rows if row[:2] == ["sort", "mixed"] and len(row) == 7]
     assert speedups[2:4] == ["19.65", "19.65"]
     assert speedups[5:] == ["20.97", "18.18"]
+    assert "real board are of times modulo 1 s, ours of whole times" in html
 
 
 def test_stages_come_in_the_order_of_the_clients(tmp_path, board_records):
