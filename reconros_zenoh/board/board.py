@@ -112,7 +112,7 @@ class Board:
                 profile.bitstream_size(plan.lut, plan.dsp, plan.bram36),
                 plan.clock_hz or (model.fabric.thread_clock.hz if model else _ANY_CLOCK_HZ),
                 reconfigurable=plan.reconfigurable,
-                icap=self.trace.icap if self.trace else None,
+                trace=self.trace,
             )
             for plan in slots
         }

@@ -201,9 +201,7 @@ class Executor:
         model = board.profile.model
         software_poll_ns = model.executor.software_poll.ns if model and self.kind == "reconros" else 0
         hardware_poll_ns = model.executor.hardware_poll.ns if model else 0
-        self._workers += [
-            SoftwareWorker(self, number, software_poll_ns) for number in range(self._software_workers)
-        ]
+        self._workers += [SoftwareWorker(self, software_poll_ns) for _ in range(self._software_workers)]
         self._workers += [HardwareWorker(self, slot, hardware_poll_ns) for slot in self._slots]
         for entry in self._policy:
             self._workers_of[entry.name] = [

@@ -54,7 +54,7 @@ class Gateway:
             board, node, topic.type, smt, qos, own=PublisherFilter(self._writer.gid)
         )
         self._hmt = Fifo(FifoPlan(), self._wake, PublisherFilter(self), cut_through=True)
-        self._track = board.trace.worker(f"RS{slot.slot_id}") if board.trace else None
+        self._track = slot.track
         self.name = node.name
         self._label = node.fully_qualified_name
         self.pair = Pair(topic.key, self._writer.topic)

@@ -9,7 +9,7 @@ from reconros_zenoh.board.busy_time import BusyTime
 from reconros_zenoh.errors import UsageError
 
 if TYPE_CHECKING:
-    from reconros_zenoh.board.trace import Track
+    from reconros_zenoh.board.trace import Trace
     from reconros_zenoh.clock.virtual import VirtualEnvironment
 
 
@@ -30,7 +30,7 @@ class Slot:
         clock_hz: float,
         *,
         reconfigurable: bool,
-        icap: Track | None = None,
+        trace: Trace | None = None,
     ) -> None:
         self.slot_id = slot_id
         self.bitstream_size = bitstream_size
@@ -40,8 +40,9 @@ class Slot:
         self.tenants: set[str] = set()
         self.is_given_away = False
         self.reconfigurations = 0
+        self.track = trace.add_slot(slot_id) if trace else None
         self.busy = BusyTime(environment)
-        self.reconfiguring = BusyTime(environment, icap)
+        self.reconfiguring = BusyTime(environment, trace.icap if trace else None)
         self.waiting = BusyTime(environment)
 
     def admit(self, name: str, *, alone: bool = False) -> Bitstream:

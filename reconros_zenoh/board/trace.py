@@ -62,26 +62,33 @@ class Track:
 class Trace:
     """The tracks of a board, and the last 200,000 slices of what was done there.
 
-    There is one for the ICAP, whose work is named by the callback that it loads, one for the communication
-    stack, which works on messages on their way `in` or `out`, and one for each worker and gateway.
+    There is one for each software worker and each slot, one for the ICAP, whose work is named by the callback
+    that it loads, and one for the communication stack, which works on messages on their way `in` or `out`.
     """
 
     def __init__(self, environment: VirtualEnvironment) -> None:
         self._environment = environment
         self._began_ns = environment.now
         self._slices: deque[Slice] = deque(maxlen=_KEPT)
-        self._workers: dict[str, Track] = {}
+        self._software: list[Track] = []
+        self._slots: list[Track] = []
         self.icap = Track(environment, "ICAP", self._slices)
         self.stack = Track(environment, "DDS stack", self._slices)
 
-    def worker(self, name: str) -> Track:
-        """Return the track of a software worker, or of the worker or gateway in a slot."""
-        return self._workers.setdefault(name, Track(self._environment, name, self._slices))
+    def add_software_worker(self) -> Track:
+        """Return the track of one more software worker."""
+        self._software.append(Track(self._environment, f"software {len(self._software)}", self._slices))
+        return self._software[-1]
+
+    def add_slot(self, slot_id: int) -> Track:
+        """Return the track of one more slot."""
+        self._slots.append(Track(self._environment, f"RS{slot_id}", self._slices))
+        return self._slots[-1]
 
     @property
     def tracks(self) -> Sequence[Track]:
-        """All tracks, the workers first."""
-        return (*self._workers.values(), self.icap, self.stack)
+        """All tracks, from the software workers to the stack."""
+        return (*self._software, *self._slots, self.icap, self.stack)
 
     def slices(self) -> Iterator[Slice]:
         """Give the slices in the order in which they ended, then what goes on still, up to now."""

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from reconros_zenoh.board.software import SoftwareImplementation
     from reconros_zenoh.board.sources import Event
     from reconros_zenoh.board.spans import Timeline
+    from reconros_zenoh.board.trace import Track
     from reconros_zenoh.clock.activity import Awaitable
     from reconros_zenoh.executor.callbacks import Dispatch
 
@@ -38,11 +39,10 @@ class Worker(ABC):
     event whose callback it runs, since `since_ns`, or None.
     """
 
-    def __init__(self, executor: Executor, name: str, resource: int, poll_ns: int) -> None:
+    def __init__(self, executor: Executor, resource: int, poll_ns: int, track: Track | None) -> None:
         self._executor = executor
         self._board = executor.board
-        trace = executor.board.trace
-        self._track = trace.worker(name) if trace else None
+        self._track = track
         self._environment = executor.board.environment
         self.resource = resource
         self._poll_ns = poll_ns
@@ -112,8 +112,9 @@ class Worker(ABC):
 class SoftwareWorker(Worker):
     """Runs callbacks as functions on a core."""
 
-    def __init__(self, executor: Executor, number: int, poll_ns: int) -> None:
-        super().__init__(executor, f"software {number}", SOFTWARE, poll_ns)
+    def __init__(self, executor: Executor, poll_ns: int) -> None:
+        trace = executor.board.trace
+        super().__init__(executor, SOFTWARE, poll_ns, trace.add_software_worker() if trace else None)
 
     def _execute(self, dispatch: Dispatch, event: Event) -> Generator[Awaitable, object, object]:
         board, timeline = self._board, event.timeline
@@ -160,7 +161,7 @@ class HardwareWorker(Worker):
     """Runs callbacks in one slot."""
 
     def __init__(self, executor: Executor, slot: Slot, poll_ns: int) -> None:
-        super().__init__(executor, f"RS{slot.slot_id}", slot.slot_id, poll_ns)
+        super().__init__(executor, slot.slot_id, poll_ns, slot.track)
         self._slot = slot
 
     def _execute(self, dispatch: Dispatch, event: Event) -> Generator[Awaitable, object, object]:

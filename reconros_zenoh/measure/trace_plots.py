@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from itertools import cycle
 from typing import TYPE_CHECKING
 
-from reconros_zenoh.measure.plots import GREY, drawing_style, mapping_colour
+from reconros_zenoh.measure.plots import GREY, drawing_style
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -18,6 +19,21 @@ _DRAWN_NS = 1_000_000_000
 _RECONFIGURATION = "#a5453b"
 _WAYS = {"in": GREY, "out": "#c9ced6"}
 _HEIGHT = 0.72
+_LEGEND_LETTERS = 50  # of the callbacks in a row, beside the other keys
+_COLOURS = (
+    "#d2691e",
+    "#2f7ec4",
+    "#2a9267",
+    "#9463c0",
+    "#c2485a",
+    "#8a7a1f",
+    "#17a5b8",
+    "#e377c2",
+    "#5b4a3f",
+    "#86b81b",
+    "#1b3a6b",
+    "#e8b923",
+)
 
 
 def trace_figure(board: str, trace: Trace) -> Figure:
@@ -37,7 +53,7 @@ def trace_figure(board: str, trace: Trace) -> Figure:
     names = [track.name for track in trace.tracks]
     shared = (trace.icap.name, trace.stack.name)
     callbacks = sorted({each.name for each in slices if each.track not in shared})
-    colours = {name: mapping_colour(number) for number, name in enumerate(callbacks)}
+    colours = dict(zip(callbacks, cycle(_COLOURS), strict=False))
     with drawing_style():
         figure = NotebookFigure(figsize=(10, 0.42 * len(names) + 1.3), layout="constrained")
         axes = figure.subplots()
@@ -52,7 +68,8 @@ def trace_figure(board: str, trace: Trace) -> Figure:
             Patch(facecolor="white", edgecolor=_RECONFIGURATION, hatch="////", label="reconfiguration")
         )
         keys += [Patch(color=colour, label=f"message {way}") for way, colour in _WAYS.items()]
-        figure.legend(handles=keys, loc="outside upper left", ncols=min(len(keys), 9))
+        rows = 1 + sum(len(name) for name in callbacks) // _LEGEND_LETTERS
+        figure.legend(handles=keys, loc="outside upper left", ncols=-(-len(keys) // rows))
     return figure
 
 

@@ -126,7 +126,7 @@ def test_without_a_trace_there_is_none(in_hardware: bool) -> None:
 def test_what_is_oldest_is_forgotten_first() -> None:
     environment = VirtualEnvironment()
     trace = Trace(environment)
-    worker = trace.worker("software 0")
+    worker = trace.add_software_worker()
     for number in range(200_003):
         worker.begin(str(number))
         worker.end()

@@ -22,7 +22,7 @@ def one_call(at_ns: int = 1_000_000) -> Trace:
     """The ICAP loads `a` for 1 ms, `a` computes for 2 ms, a message goes out for 1 ms."""
     environment = VirtualEnvironment(0)
     trace = Trace(environment)
-    worker = trace.worker("RS0")
+    worker = trace.add_slot(0)
     environment.run(until=at_ns)
     worker.begin("a")
     trace.icap.begin("a")
