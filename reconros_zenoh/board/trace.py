@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from reconros_zenoh.clock.virtual import VirtualEnvironment
 
 _KEPT = 200_000
-"""Some minutes of a busy board, and 30 MB."""
+"""Nearly two minutes of the round-trip application, and 30 MB."""
 
 
 class Slice(NamedTuple):
@@ -28,35 +28,35 @@ class Slice(NamedTuple):
 class Track:
     """One line of a trace: a part that does one thing at a time."""
 
-    __slots__ = ("_environment", "_name", "_since_ns", "_slices", "name")
+    __slots__ = ("_environment", "_since_ns", "_slices", "_what", "name")
 
     def __init__(self, environment: VirtualEnvironment, name: str, slices: deque[Slice]) -> None:
         self._environment = environment
         self._slices = slices
         self.name = name
-        self._name: str | None = None
+        self._what: str | None = None
         self._since_ns = 0
 
-    def begin(self, name: str) -> None:
+    def begin(self, what: str) -> None:
         """Note that the part begins to do this."""
-        self._name = name
+        self._what = what
         self._since_ns = self._environment.now
 
     def stage(self, stage: Stage, since_ns: int) -> None:
         """Note that a stage of what the part does ends now."""
-        if self._name is not None:
+        if self._what is not None:
             now = self._environment.now
-            self._slices.append(Slice(self.name, self._name, stage, max(since_ns, self._since_ns), now))
+            self._slices.append(Slice(self.name, self._what, stage, max(since_ns, self._since_ns), now))
 
     def end(self) -> None:
         """Note that it is done."""
         self._slices.extend(self.unfinished())
-        self._name = None
+        self._what = None
 
     def unfinished(self) -> Iterator[Slice]:
         """Give what the part has been doing up to now, if it does anything."""
-        if self._name is not None:
-            yield Slice(self.name, self._name, None, self._since_ns, self._environment.now)
+        if self._what is not None:
+            yield Slice(self.name, self._what, None, self._since_ns, self._environment.now)
 
 
 class Trace:

@@ -14,7 +14,6 @@ from reconros_zenoh.experiments.stimulus import feed
 from reconros_zenoh.mapping.project_graph import OUTSIDE, read_project_graph, topic_ends
 from reconros_zenoh.measure.record import RecordWriter, RoundTrip
 from reconros_zenoh.measure.statistics import summarise
-from reconros_zenoh.project.hosting import BoardOptions
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
