@@ -15,7 +15,8 @@ from reconros_zenoh.board.sources import ServiceSource, SubscriptionSource, Time
 from reconros_zenoh.board.stack_node import StackNode
 from reconros_zenoh.errors import FileError, UsageError
 from reconros_zenoh.project.build_cfg import RosGateway
-from reconros_zenoh.project.communication import endpoint_name, gateway_pair, gateway_slots
+from reconros_zenoh.project.communication import endpoint_name, gateway_pair
+from reconros_zenoh.project.gateway_slots import gateway_slots
 from reconros_zenoh.rmw.parameters import Parameters
 
 if TYPE_CHECKING:
@@ -228,7 +229,8 @@ class Application:
         if self.executor is None:
             raise UsageError("app.spin() without a callback. Call app.register(...) first.")
         configuration = self.project.configuration
-        slots = gateway_slots(configuration, self.mapping.callbacks)
+        mapped = {name: callback.slots for name, callback in self.mapping.callbacks.items()}
+        slots = gateway_slots(configuration, mapped)
         for gateway in configuration.gateways:
             pair = gateway_pair(configuration.path, gateway)
             message_type = self._type(gateway, self.types.message)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal, Self
 from pydantic import BaseModel, ConfigDict, Field, StrictBool, StrictInt, ValidationError
 
 from reconros_zenoh.errors import FileError
-from reconros_zenoh.project.communication import gateway_slots
+from reconros_zenoh.project.gateway_slots import gateway_slots
 from reconros_zenoh.toml_file import TomlFile
 
 if TYPE_CHECKING:
