@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from reconros_zenoh.board.spans import Stage
+    from reconros_zenoh.board.stages import Stage
     from reconros_zenoh.clock.virtual import VirtualEnvironment
 
 _KEPT = 200_000

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, get_args
 
 from rich.text import Text
 
-from reconros_zenoh.board.spans import Stage
+from reconros_zenoh.board.stages import Stage
 from reconros_zenoh.cli.console import print_rows, short_ms
 
 if TYPE_CHECKING:

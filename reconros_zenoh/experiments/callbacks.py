@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from reconros_zenoh.board.cpu import Cpu
     from reconros_zenoh.board.host import Limit
     from reconros_zenoh.board.profile import Model, Profile
-    from reconros_zenoh.board.spans import Stage
+    from reconros_zenoh.board.stages import Stage
     from reconros_zenoh.clock.activity import Awaitable
     from reconros_zenoh.experiments.roundtrip import Clock
     from reconros_zenoh.measure.record import RoundTrip

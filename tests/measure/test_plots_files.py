@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from board_like_runs import like_the_board
 
-from reconros_zenoh.board.spans import Stage
+from reconros_zenoh.board.stages import Stage
 from reconros_zenoh.errors import UsageError
 from reconros_zenoh.measure import plots
 from reconros_zenoh.measure.histogram import NamedRecord
