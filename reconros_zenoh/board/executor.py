@@ -52,12 +52,8 @@ class _Registration:
 
     def timing(self) -> dict[str, object]:
         """Return what the time of the callback rests on in each place where it may run."""
-        places: dict[str, object] = {}
-        if self.software is not None:
-            places["software"] = describe(self.software.time)
-        for _, time, _ in self.slots.values():
-            places["hardware"] = describe(time)
-        return places
+        software = {} if self.software is None else {"software": describe(self.software.time)}
+        return software | {f"slot {slot}": describe(time) for slot, (_, time, _) in self.slots.items()}
 
 
 class Executor:

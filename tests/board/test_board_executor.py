@@ -162,7 +162,8 @@ def test_where_each_callback_may_run() -> None:
             "slots": [0, 1],
             "timing": {
                 "software": {"basis": "table", "ms": 0.00001},
-                "hardware": {"basis": "table", "ms": 0.00001},
+                "slot 0": {"basis": "table", "ms": 0.00001},
+                "slot 1": {"basis": "table", "ms": 0.00001},
             },
             "calls": 0,
             "failed": 0,

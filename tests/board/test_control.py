@@ -56,7 +56,7 @@ def test_the_status_of_a_board() -> None:
                 "kind": "SUB",
                 "software": False,
                 "slots": [0],
-                "timing": {"hardware": {"basis": "table", "ms": 2.0}},
+                "timing": {"slot 0": {"basis": "table", "ms": 2.0}},
                 "calls": 2,
                 "failed": 0,
                 "dropped": 0,

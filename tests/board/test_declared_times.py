@@ -53,10 +53,11 @@ def software_ns(board: Board, timing: Any, function: Any = ignore, name: str = "
     return source.timelines[0].age_ns
 
 
-def board_with_slot(clock_hz: int | None) -> Board:
+def board_with_slots(*clocks_hz: int | None) -> Board:
     environment = VirtualEnvironment()
     context = Context(SimulatedNetwork(environment).transport("b0"), 0, environment.clock_ns)
-    return Board(environment, context, PROFILE, (SlotPlan(0, 100, 0, 0, clock_hz),))
+    slots = [SlotPlan(slot, 100, 0, 0, clock_hz) for slot, clock_hz in enumerate(clocks_hz)]
+    return Board(environment, context, PROFILE, tuple(slots))
 
 
 def test_the_table_of_the_profile() -> None:
@@ -65,8 +66,8 @@ def test_the_table_of_the_profile() -> None:
 
 
 def test_the_table_holds_at_the_profiles_clock_of_hardware_threads() -> None:
-    assert hardware_ns(board_with_slot(None), None, name="table") == 200
-    assert hardware_ns(board_with_slot(500_000_000), None, name="table") == 400
+    assert hardware_ns(board_with_slots(None), None, name="table") == 200
+    assert hardware_ns(board_with_slots(500_000_000), None, name="table") == 400
 
 
 def test_what_is_declared_goes_before_the_table() -> None:
@@ -75,8 +76,8 @@ def test_what_is_declared_goes_before_the_table() -> None:
 
 
 def test_cycles_are_those_of_the_slots_clock() -> None:
-    assert hardware_ns(board_with_slot(None), Cycles(120_000)) == 120_000
-    assert hardware_ns(board_with_slot(120_000_000), Cycles(120_000)) == 1_000_000
+    assert hardware_ns(board_with_slots(None), Cycles(120_000)) == 120_000
+    assert hardware_ns(board_with_slots(120_000_000), Cycles(120_000)) == 1_000_000
 
 
 def test_a_callback_declares_cycles_as_it_runs() -> None:
@@ -84,7 +85,7 @@ def test_a_callback_declares_cycles_as_it_runs() -> None:
         for cycles in (6, 12):
             yield from thread.compute_cycles(cycles)
 
-    assert hardware_ns(board_with_slot(100_000_000), Cycles(0), callback) == 180
+    assert hardware_ns(board_with_slots(100_000_000), Cycles(0), callback) == 180
 
 
 @pytest.fixture
@@ -145,7 +146,16 @@ def test_the_status_says_where_the_time_comes_from(timing: Any, told: dict[str, 
     board = small_board(PROFILE, 1)
     executor = Executor(board, 0, 1)
     executor.add_hw_callback("table", [0], SUB, Tickets(board), computing, timing=timing)
-    assert executor.statistics()["table"]["timing"] == {"hardware": told}
+    assert executor.statistics()["table"]["timing"] == {"slot 0": told}
+
+
+def test_the_status_says_it_for_each_slot() -> None:
+    executor = Executor(board_with_slots(500_000_000, None), 0, 2)
+    executor.add_hw_callback("table", [0, 1], SUB, Tickets(executor.board), computing)
+    assert executor.statistics()["table"]["timing"] == {
+        "slot 0": {"basis": "table", "ms": 0.0004},
+        "slot 1": {"basis": "table", "ms": 0.0002},
+    }
 
 
 @pytest.mark.parametrize("profile", [PROFILE, read_profile("native")])

@@ -19,7 +19,7 @@ STATUS = {
             "kind": "SUB",
             "software": True,
             "slots": [2, 3],
-            "timing": {"software": {"basis": "table"}, "hardware": {"basis": "cycles"}},
+            "timing": {"software": {"basis": "table"}, "slot 0": {"basis": "cycles"}},
             "calls": 7,
             "failed": 1,
             "dropped": 2,

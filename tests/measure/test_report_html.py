@@ -155,8 +155,8 @@ def test_the_report_replaces_an_older_one_or_leaves_it(tmp_path):
 
 
 def test_the_report_says_what_the_times_of_callbacks_rest_on(tmp_path):
-    timing = {"mixed": {"sort": {"software": {"basis": "cycles"}, "hardware": {"basis": "table"}}}}
+    timing = {"mixed": {"sort": {"software": {"basis": "cycles"}, "slot 1": {"basis": "table"}}}}
     records = {"mixed": {"sort": Record("sort", np.array([2.5]))}}
     experiment = experiment_of(records, "virtual", timing=timing)
     page = Page(written(tmp_path / "report.html", (experiment, records)))
-    assert "sort in software from cycles, sort in hardware from table" in page.text
+    assert "sort in software from cycles, sort in slot 1 from table" in page.text
