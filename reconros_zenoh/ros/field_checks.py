@@ -55,8 +55,8 @@ class FieldChecks:
         """Raise TypeError for a field of another dtype or length, AttributeError for a missing one."""
         for field, dtypes in self._arrays:
             array = getattr(message, field)
-            if getattr(array, "dtype", None) not in dtypes:
-                is_array = isinstance(array, np.ndarray)
+            is_array = isinstance(array, np.ndarray)
+            if not is_array or array.dtype not in dtypes:
                 found = f"an array of {array.dtype}" if is_array else f"a {type(array).__name__}"
                 raise self._error(field, f"is {found}, not an array of {dtypes[0]}")
         for field, least, most in self._lengths:

@@ -279,11 +279,13 @@ def test_an_array_of_another_dtype_in_the_only_message_within() -> None:
 
 
 JOINT = REGISTRY.message("lab_msgs/Joint").cls
-LENGTHS = {
+FORMS = {
     "too few messages": ("joints", [JOINT("a")], "'joints' of lab_msgs/msg/Arm is of length 1, not 2"),
     "too many messages": ("joints", [JOINT("a")] * 3, "'joints' of lab_msgs/msg/Arm is of length 3, not 2"),
     "nested": ("joints", [JOINT("12345")] * 2, "'name' of lab_msgs/msg/Joint is of length 5, not at most 4"),
     "strings": ("names", ["a"], "'names' of lab_msgs/msg/Arm is of length 1, not 2"),
+    # For NumPy None is as good as float64.
+    "no array": ("pose", [0.0, 0.0], "'pose' of lab_msgs/msg/Arm is a list, not an array of float64"),
     "numbers": ("pose", np.zeros(1), "'pose' of lab_msgs/msg/Arm is of length 1, not 2"),
     "bounded": ("codes", np.zeros(3, np.int16), "'codes' of lab_msgs/msg/Arm is of length 3, not at most 2"),
     "bounded string": ("tags", ["1", "123"], "'tags' of lab_msgs/msg/Arm has a string of length 3, not"),
@@ -291,8 +293,8 @@ LENGTHS = {
 }
 
 
-@pytest.mark.parametrize(("field", "value", "told"), LENGTHS.values(), ids=LENGTHS)
-def test_a_field_of_another_length_is_a_usage_error_that_names_it(field: str, value: Any, told: str) -> None:
+@pytest.mark.parametrize(("field", "value", "told"), FORMS.values(), ids=FORMS)
+def test_a_field_of_another_form_is_a_usage_error_that_names_it(field: str, value: Any, told: str) -> None:
     kind = REGISTRY.message("lab_msgs/Arm")
     message = zero_message(kind)
     kind.encode(message)
