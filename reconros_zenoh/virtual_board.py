@@ -62,7 +62,9 @@ class VirtualDesktop:
         return self.environment.now / 1e6
 
     def run(self, seconds: float) -> None:
-        """Let so many seconds of virtual time pass."""
+        """Let so many seconds of virtual time pass; raise UsageError for less than a nanosecond."""
+        if not seconds * _SECOND_NS >= 1:
+            raise UsageError(f"a board cannot run for {seconds} s. Give more than 0.")
         self.environment.run(until=self.environment.now + round(seconds * _SECOND_NS))
 
     def listen(self, topic: str, type_name: str) -> list[Any]:

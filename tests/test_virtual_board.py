@@ -180,6 +180,9 @@ def test_what_makes_no_sense_is_refused() -> None:
     board = rz.VirtualBoard()
     with pytest.raises(rz.UsageError, match="a period of 0 ns"):
         board.timer(0)
+    for seconds in (0, -1, 1e-10, np.nan):
+        with pytest.raises(rz.UsageError, match=f"cannot run for {seconds} s"):
+            board.run(seconds)
     for depth in (0, -1):
         with pytest.raises(rz.UsageError, match="keeps none"):
             board.subscription("/in", WORD, rz.QosProfile(depth=depth))

@@ -12,7 +12,7 @@ import typer
 from reconros_zenoh.cli.console import PlainConsole, print_rows
 from reconros_zenoh.cli.options import AsJson
 from reconros_zenoh.project.build_cfg import read_build_cfg
-from reconros_zenoh.project.communication import check_topics
+from reconros_zenoh.project.communication import check_topics, check_types
 from reconros_zenoh.project.loader import read_project
 from reconros_zenoh.project.resources import slot_resources
 
@@ -46,7 +46,7 @@ def check(
     """
     if project.is_dir():
         files = read_project(project)
-        files.types()
+        check_types(files.configuration, files.types())
         for refused in files.unusable_mappings().values():
             raise refused
         configuration = files.configuration

@@ -83,8 +83,11 @@ def read_inputs(inputs: Sequence[str], known: Mapping[str, str], types: TypeRegi
         topic, _, text = given.partition("=")
         if topic not in known:
             raise UsageError(
-                f"the project does not wait for {topic!r} from outside. It does for: {_listed(known)}."
+                f"the project does not wait for {topic!r} from outside. It does for: {_listed(known)}; what "
+                "it publishes itself is not from outside."
             )
+        if topic in messages:
+            raise UsageError(f"{topic} has two inputs. Give all its fields in one --input.")
         message_type = types.message(known[topic])
         messages[topic] = message_type.encode(message_of(message_type, _fields(given, text)))
     return messages

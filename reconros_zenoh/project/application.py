@@ -13,9 +13,8 @@ from reconros_zenoh.board.hmt import HmtSource, HmtWriter
 from reconros_zenoh.board.os_resources import Condition, Mailbox, Mutex, Semaphore, SharedMemory
 from reconros_zenoh.board.sources import ServiceSource, SubscriptionSource, TimerSource
 from reconros_zenoh.board.stack_node import StackNode
-from reconros_zenoh.errors import FileError, UsageError
-from reconros_zenoh.project.build_cfg import RosGateway
-from reconros_zenoh.project.communication import endpoint_name, gateway_pair
+from reconros_zenoh.errors import UsageError
+from reconros_zenoh.project.communication import declared_type, endpoint_name, gateway_pair
 from reconros_zenoh.project.gateway_slots import gateway_slots
 from reconros_zenoh.rmw.parameters import Parameters
 
@@ -233,7 +232,7 @@ class Application:
         slots = gateway_slots(configuration, mapped)
         for gateway in configuration.gateways:
             pair = gateway_pair(configuration.path, gateway)
-            message_type = self._type(gateway, self.types.message)
+            message_type = declared_type(configuration.path, gateway, self.types.message)
             self.board.add_gateway(
                 gateway.name, pair.hmt, pair.smt, message_type, slots[gateway.name], gateway.qos
             )
@@ -244,17 +243,11 @@ class Application:
         for node in self._nodes.values():
             node.close()
 
-    def _type(self, end: Resource | RosGateway, find: Callable[[str], T]) -> T:
-        """Return the type of an end or gateway; raise FileError with its line for one that nobody defines."""
-        try:
-            return find(end.type if isinstance(end, RosGateway) else _required(end.interface))
-        except UsageError as error:
-            raise FileError(self.project.configuration.path, end.line, f"{end.name}: {error}") from error
-
     def _end(self, end: Resource, find: Callable[[str], T]) -> tuple[Node, T, str]:
         """Return node, type and name, as written, of an end; raise FileError for what cannot be."""
-        endpoint_name(self.project.configuration.path, end)
-        return self._node(_required(end.node)), self._type(end, find), _required(end.ros_name)
+        path = self.project.configuration.path
+        endpoint_name(path, end)
+        return self._node(_required(end.node)), declared_type(path, end, find), _required(end.ros_name)
 
     def _shared(self, group: str, name: str, kind: str, make: Callable[[Resource], T]) -> T:
         if (group, name) not in self._made:
@@ -285,9 +278,9 @@ class Application:
 
     def _hardware_topic(self, resource: Resource) -> HardwareTopic:
         self._node(_required(resource.node))  # of a stream nothing is in the network, but its node is
+        path = self.project.configuration.path
         return self.board.hardware_topic(
-            endpoint_name(self.project.configuration.path, resource),
-            self._type(resource, self.types.message),
+            endpoint_name(path, resource), declared_type(path, resource, self.types.message)
         )
 
     def _node(self, name: str) -> Node:

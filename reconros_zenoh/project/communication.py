@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections import defaultdict
 from itertools import product
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 from reconros_zenoh.errors import FileError, UsageError
 from reconros_zenoh.gateway.filters import Pair, conflict
+from reconros_zenoh.project.build_cfg import RosGateway
 from reconros_zenoh.project.gateway_slots import gateway_slots
 from reconros_zenoh.ros.names import resolve
 from reconros_zenoh.ros.zero_message import zero_message
@@ -16,10 +17,12 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
     from pathlib import Path
 
-    from reconros_zenoh.project.build_cfg import BuildConfiguration, RosGateway
+    from reconros_zenoh.project.build_cfg import BuildConfiguration
     from reconros_zenoh.project.mapping_file import CallbackMapping
     from reconros_zenoh.project.resource_groups import Resource
     from reconros_zenoh.ros.types import TypeRegistry
+
+T = TypeVar("T")
 
 _ENDS = {"rossub": "subscriber", "rospub": "publisher"}
 
@@ -42,6 +45,16 @@ def gateway_pair(path: Path, gateway: RosGateway) -> Pair:
         for topic in (gateway.hw_topic, gateway.sw_topic)
     )
     return Pair(hmt, smt)
+
+
+def declared_type(path: Path, end: Resource | RosGateway, find: Callable[[str], T]) -> T:
+    """Return what `find` finds of the type of an end or gateway; raise FileError where nobody defines it."""
+    name = end.type if isinstance(end, RosGateway) else end.interface
+    assert name is not None
+    try:
+        return find(name)
+    except UsageError as error:
+        raise FileError(path, end.line, f"{end.name}: {error}") from error
 
 
 def check_topics(configuration: BuildConfiguration) -> None:
@@ -67,6 +80,20 @@ def check_topics(configuration: BuildConfiguration) -> None:
                 )
 
 
+def check_types(configuration: BuildConfiguration, types: TypeRegistry) -> None:
+    """Raise FileError at the line of the first end or gateway of a type that nobody defines.
+
+    So it does for an end with a name that ROS 2 does not allow.
+    """
+    find = {"msg": types.message, "srv": types.service, "action": types.action}
+    for end in configuration.resources:
+        if end.node is not None and end.interface is not None:
+            endpoint_name(configuration.path, end)
+            declared_type(configuration.path, end, find[end.interface.split("/")[1]])
+    for gateway in configuration.gateways:
+        declared_type(configuration.path, gateway, types.message)
+
+
 def check_fifos(configuration: BuildConfiguration, types: Callable[[], TypeRegistry]) -> None:
     """Raise FileError at the line of the first end that no message of its type fits, or of an unknown type.
 
@@ -75,11 +102,7 @@ def check_fifos(configuration: BuildConfiguration, types: Callable[[], TypeRegis
     for end in configuration.resources:
         if end.fifo.message_bytes is None:
             continue
-        assert end.interface is not None
-        try:
-            message_type = types().message(end.interface)
-        except UsageError as error:
-            raise FileError(configuration.path, end.line, f"{end.name}: {error}") from error
+        message_type = declared_type(configuration.path, end, types().message)
         smallest = sum(map(len, message_type.encode(zero_message(message_type))))
         if end.fifo.message_bytes < smallest:
             raise FileError(

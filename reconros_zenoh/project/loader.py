@@ -111,7 +111,7 @@ class ProjectFiles:
         for name_or_file in names_or_files:
             mapping = self.mapping(name_or_file)
             if mapping.name in mappings:
-                raise UsageError(f"two mappings are named {mapping.name!r}. Rename one of the files.")
+                raise UsageError(f"two mappings are named {mapping.name!r}. Give it once, or rename a file.")
             mappings[mapping.name] = mapping
         return mappings
 

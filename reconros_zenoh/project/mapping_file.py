@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
     from reconros_zenoh.project.build_cfg import BuildConfiguration, ReconosThread
 
+_UNKNOWN_KEY = "extra_forbidden"  # as pydantic calls it
 _Count = Annotated[StrictInt, Field(ge=0, le=1000)]
 
 
@@ -206,9 +207,10 @@ def _check_callback(
 
 
 def _schema_error(toml: TomlFile, error: ValidationError) -> FileError:
-    first = error.errors()[0]
+    # A misspelt key is an unknown one and a missing one: the unknown one stands in the file.
+    first = min(error.errors(), key=lambda mistake: mistake["type"] != _UNKNOWN_KEY)
     place = [str(key) for key in first["loc"]]
-    if first["type"] == "extra_forbidden":
+    if first["type"] == _UNKNOWN_KEY:
         known = (
             CallbackMapping.model_fields if len(place) > 1 else ProjectMapping.model_fields.keys() - {"name"}
         )
@@ -221,6 +223,6 @@ def _schema_error(toml: TomlFile, error: ValidationError) -> FileError:
     return FileError(
         toml.path,
         toml.line(place),
-        f"{'.'.join(place)}: {first['msg']}.",
+        f"{'.'.join(place)}: {first['msg'].replace('tuple', 'list')}.",
         "Correct the value or add the key.",
     )

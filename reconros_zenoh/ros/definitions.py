@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import re
 from typing import TYPE_CHECKING
 
+import numpy as np
 from rosbags.interfaces import Nodetype
 from rosbags.typesys import TypesysError, get_types_from_msg
 
@@ -17,6 +19,7 @@ if TYPE_CHECKING:
 
 _NAME = re.compile(r"(?!.*__)(?!.*_/)([a-z][a-z0-9_]*)/(msg|srv|action)/([A-Z][A-Za-z0-9]*)")
 _WIDE_STRING = re.compile(r"\s*wstring\b")
+_ASSIGNMENT = re.compile(r"\s*\S+\s+\w+\s*=")
 _EVENT_INFO = "service_msgs/msg/ServiceEventInfo"
 _GOAL_ID: tuple[str, FieldDesc] = ("goal_id", (Nodetype.NAME, "unique_identifier_msgs/msg/UUID"))
 _STAMP: FieldDesc = (Nodetype.NAME, "builtin_interfaces/msg/Time")
@@ -160,8 +163,7 @@ def _definition(
         if _WIDE_STRING.match(line):
             raise FileError(name, number, "wstring is not supported.", "Use string, which holds UTF-8.")
         try:
-            # rosbags takes the names of messages only; the name says where `Type` without package is.
-            ((more_constants, more_fields),) = get_types_from_msg(line, f"{package}/msg/Line").values()
+            more_constants, more_fields = _parsed(package, line)
         except (TypesysError, AssertionError, ValueError):  # the last for a number of thousands of digits
             raise FileError(
                 name,
@@ -169,6 +171,39 @@ def _definition(
                 f"{line.strip()!r} is neither a field, a constant nor a comment.",
                 "Write for example 'uint32[] data' or 'uint8 RED=1'.",
             ) from None
-        constants += more_constants
+        for constant, kind, value in more_constants:
+            try:
+                constants.append((constant, kind, _constant_value(kind, value, line)))
+            except ValueError:
+                raise FileError(
+                    name,
+                    number,
+                    f"{value!r} is no value of the constant {constant}.",
+                    f"Give it one of its type, {kind}.",
+                ) from None
         fields += [(field, char_as_uint8(description)) for field, description in more_fields]
     return constants, fields
+
+
+def _parsed(package: str, line: str) -> tuple[Constdefs, Fielddefs]:
+    """Return the constants and fields of a line; raise what rosbags raises, ValueError for no constant."""
+    # rosbags takes the names of messages only; the name says where `Type` without package is.
+    ((constants, fields),) = get_types_from_msg(line, f"{package}/msg/Line").values()
+    if fields and _ASSIGNMENT.match(line):
+        raise ValueError(line)  # rosbags takes what it cannot read behind the `=` for a default
+    return constants, fields
+
+
+def _constant_value(kind: str, value: str | float, line: str) -> str | float:
+    """Return the value that rosbags reads in the line of a constant as one of its type, else ValueError."""
+    if kind == "string":  # rosbags has numbers where they look like that
+        return value if isinstance(value, str) else line.split("=", 1)[1].split("#", 1)[0].strip()
+    if kind in {"float32", "float64"}:
+        if not math.isfinite(float(value)):
+            raise ValueError(value)
+        return float(value)
+    limits = np.iinfo("uint8" if kind in {"byte", "char"} else kind) if kind != "bool" else None
+    least, most = (limits.min, limits.max) if limits else (0, 1)
+    if not isinstance(value, int) or not least <= value <= most:
+        raise ValueError(value)
+    return int(value) if limits else bool(value)

@@ -15,13 +15,13 @@ from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, TypesysError, get_typestore
 
 from reconros_zenoh.errors import BadMessageError, FileError, UsageError
-from reconros_zenoh.ros.array_fields import ArrayFields
 from reconros_zenoh.ros.definitions import (
     action_definitions,
     char_as_uint8,
     message_definition,
     service_definitions,
 )
+from reconros_zenoh.ros.field_checks import FieldChecks
 from reconros_zenoh.ros.message_arrays import is_unchanging
 from reconros_zenoh.ros.names import dds_type_name
 from reconros_zenoh.ros.standard import standard_interfaces
@@ -74,7 +74,7 @@ class MessageType:
         self.fields = definition.fields
         self._fields_before = [field for field, _ in definition.fields[:-1]]
         self._last_array = _last_array(definition.fields)
-        self._array_fields = ArrayFields(store, name)
+        self._field_checks = FieldChecks(store, name)
 
     def __repr__(self) -> str:
         return f"MessageType({self.name!r})"
@@ -115,8 +115,8 @@ class MessageType:
         """
         self.check(message)
         try:
-            if self._array_fields.are_some:
-                self._array_fields.check(message)
+            if self._field_checks.are_some:
+                self._field_checks.check(message)
             if self._last_array is not None:
                 field, empty = self._last_array
                 array = getattr(message, field)

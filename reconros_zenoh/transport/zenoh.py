@@ -99,7 +99,9 @@ class ZenohTransport(Closing):
         try:
             return cls(open_session(config))
         except zenoh.ZError as error:
-            raise TransportError(f"no Zenoh router at {router}: start one with `reconros router`") from error
+            raise TransportError(
+                f"no Zenoh router at {router}: start one with `reconros router --listen {router}`"
+            ) from error
 
     def publish(self, key: str, qos: QosProfile, on_matching: OnMatching | None = None) -> _Publisher:
         """Declare a publisher, see `Transport.publish`."""

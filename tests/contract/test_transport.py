@@ -741,7 +741,9 @@ def test_no_router_is_said_in_one_sentence(capfd: pytest.CaptureFixture[str]) ->
     endpoint = free_endpoint()
     with pytest.raises(TransportError) as caught:
         ZenohTransport.open(endpoint, timeout_s=0.3)
-    assert str(caught.value) == f"no Zenoh router at {endpoint}: start one with `reconros router`"
+    assert str(caught.value) == (
+        f"no Zenoh router at {endpoint}: start one with `reconros router --listen {endpoint}`"
+    )
     assert capfd.readouterr() == ("", "")
 
 

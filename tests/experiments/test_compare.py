@@ -155,13 +155,17 @@ def test_where_nothing_leaves_the_board_nothing_is_drawn(tmp_path: Path) -> None
     ("arguments", "says"),
     [
         (["--input", "/angel"], "the project does not wait for '/angel' from outside. It does for: /angle"),
-        (["--input", "/legangle"], "the project does not wait for '/legangle' from outside"),
+        (["--input", "/legangle"], "; what it publishes itself is not from outside."),
+        (
+            ["--input", "/angle", "--input", "/angle={data: 80}"],
+            "/angle has two inputs. Give all",
+        ),
         (["--input", "/angle={data: "], "is no YAML after the `=`"),
         (["--input", "/angle=80"], "write the fields as of `ros2 topic pub`"),
         (["--input", "/angle={date: 80}"], "has no field 'date'"),
         (["--bag", "nowhere"], "nowhere cannot be read as a rosbag2 recording"),
         (["--mapping", "mixt"], "no mapping named 'mixt'"),
-        (["--mapping", "mixed", "--mapping", "mixed"], "two mappings are named 'mixed'"),
+        (["--mapping", "mixed", "--mapping", "mixed"], "two mappings are named 'mixed'. Give it once"),
         (["--profile", "native"], "profile 'native' models nothing"),
     ],
 )

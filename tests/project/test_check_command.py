@@ -230,6 +230,34 @@ def test_topics_that_cannot_be_mapped_are_refused(tmp_path: Path) -> None:
         run(path)
 
 
+def test_a_service_name_that_ros_2_does_not_allow_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "build.cfg"
+    path.write_text(
+        "[ResourceGroup@g]\nnode = rosnode, /n\nflip = rossrvmsg, std_srvs, srv, SetBool\n"
+        'serve = rossrvs, node, flip, "to flip"\n',
+        encoding="utf-8",
+    )
+    with pytest.raises(FileError, match=r"build\.cfg:4: The topic or service name 'to flip' contains ' '"):
+        run(tmp_path)
+
+
+@pytest.mark.parametrize(
+    "end",
+    [
+        "word = rosmsg, std_msgs, msg, Uint33\nsub = rossub, node, word, /a",
+        "flip = rossrvmsg, std_srvs, srv, SetBol\nask = rossrvc, node, flip, /a",
+        "go = rosactionmsg, std_srvs, action, SetBool\ndo = rosactions, node, go, /a",
+        "[ROSGateway@g]\nSlot = s(*)\nHWTopic = /a\nSWTopic = /a\nMsgType = a_msgs/T",
+    ],
+)
+def test_a_type_that_nobody_defines_is_refused(tmp_path: Path, end: str) -> None:
+    path = tmp_path / "build.cfg"
+    path.write_text(f"[ResourceGroup@g]\nnode = rosnode, /n\n{end}\n", encoding="utf-8")
+    assert facts(path)  # of the file alone nobody knows what is in msg/
+    with pytest.raises(FileError, match=r"build\.cfg:[34]: .* is not known"):
+        run(tmp_path)
+
+
 def test_the_mapping_files_of_a_folder_are_read(tmp_path: Path) -> None:
     folder = shutil.copytree(application_folder(), tmp_path / "project")
     run(folder)

@@ -112,6 +112,8 @@ MISTAKES = {
     "unknown key": ("workers = 2\n" + GOOD, 1, "workers: unknown key. Known keys: callbacks, executor"),
     "name": ('name = "x"\n' + GOOD, 1, "unknown key"),
     "unknown key of a callback": (GOOD + "slot = 1\n", 10, "Known keys: slots, software"),
+    "misspelt key": (GOOD.replace("software_w", "softwarew"), 2, "softwareworkers: unknown key. Known keys:"),
+    "slots that are no list": (GOOD.replace("[2, 3]", "2"), 5, "slots: Input should be a valid list"),
     "unknown executor": (GOOD.replace("reconros", "other"), 1, "'reconros' or 'standard'"),
     "no executor": (GOOD.split("\n", 1)[1], None, "executor: Field required"),
     "no workers": (GOOD.replace("software_workers = 2\n", ""), None, "software_workers: Field required"),

@@ -26,6 +26,12 @@ REGISTRY.add_message("lab_msgs/msg/Wide", "uint8 id\nuint64[] data\n")
 REGISTRY.add_message("lab_msgs/msg/Names", "uint8[3] rgb\nstring[] names\n")
 REGISTRY.add_message("lab_msgs/msg/Nested", "Wide[] wide\nShorts[2] shorts\nfloat64 last\n")
 REGISTRY.add_message("lab_msgs/msg/Floats", "float32[] data\n")
+REGISTRY.add_message("lab_msgs/msg/Joint", "string<=4 name\n")
+REGISTRY.add_message(
+    "lab_msgs/msg/Arm",
+    "Joint[2] joints\nstring[2] names\nfloat64[2] pose\nint16[<=2] codes\n"
+    "string<=2[] tags\nstring[] labels\n",
+)
 REGISTRY.add_message("lab_msgs/msg/Keyword", "uint8 from\nuint8[] import\n")
 
 TYPES = [
@@ -269,6 +275,31 @@ def test_an_array_of_another_dtype_in_the_only_message_within() -> None:
     kind.encode(message)
     message.pose.covariance = np.zeros(36, np.int64)
     with pytest.raises(UsageError, match="'covariance' of geometry_msgs/msg/PoseWithCovariance is an array"):
+        kind.encode(message)
+
+
+JOINT = REGISTRY.message("lab_msgs/Joint").cls
+FORMS = {
+    "too few messages": ("joints", [JOINT("a")], "'joints' of lab_msgs/msg/Arm is of length 1, not 2"),
+    "too many messages": ("joints", [JOINT("a")] * 3, "'joints' of lab_msgs/msg/Arm is of length 3, not 2"),
+    "nested": ("joints", [JOINT("12345")] * 2, "'name' of lab_msgs/msg/Joint is of length 5, not at most 4"),
+    "strings": ("names", ["a"], "'names' of lab_msgs/msg/Arm is of length 1, not 2"),
+    # For NumPy None is as good as float64.
+    "no array": ("pose", [0.0, 0.0], "'pose' of lab_msgs/msg/Arm is a list, not an array of float64"),
+    "numbers": ("pose", np.zeros(1), "'pose' of lab_msgs/msg/Arm is of length 1, not 2"),
+    "bounded": ("codes", np.zeros(3, np.int16), "'codes' of lab_msgs/msg/Arm is of length 3, not at most 2"),
+    "bounded string": ("tags", ["1", "123"], "'tags' of lab_msgs/msg/Arm has a string of length 3, not"),
+    "letters": ("labels", "ab", "'labels' of lab_msgs/msg/Arm is a str, not a list of them"),
+}
+
+
+@pytest.mark.parametrize(("field", "value", "told"), FORMS.values(), ids=FORMS)
+def test_a_field_of_another_form_is_a_usage_error_that_names_it(field: str, value: Any, told: str) -> None:
+    kind = REGISTRY.message("lab_msgs/Arm")
+    message = zero_message(kind)
+    kind.encode(message)
+    setattr(message, field, value)
+    with pytest.raises(UsageError, match=f"cannot be serialised: field {told}"):
         kind.encode(message)
 
 

@@ -192,6 +192,7 @@ def test_a_message_is_no_service(registry: TypeRegistry) -> None:
         ("uint32 a\n---\n", 2),
         ("uint32\n", 1),
         ("uint8 RED=[1, 2]", 1),
+        ("uint8 a\nuint8 RED = 1 2\n", 2),
         ("=" * 80 + "\nMSG: lab_msgs/msg/Other\nuint8 a\n", 1),
     ],
 )
@@ -200,6 +201,36 @@ def test_a_line_that_cannot_be_understood_is_named(registry: TypeRegistry, text:
         registry.add_message("lab_msgs/msg/Wrong", text)
     assert caught.value.line == line
     assert caught.value.path == "lab_msgs/msg/Wrong"
+
+
+CONSTANTS: dict[str, object] = {
+    "uint8 C=255": 255,
+    "byte C=0xff": 255,
+    "int8 C=-128 # lowest": -128,
+    "bool C=1": True,
+    "float32 C=3": 3.0,
+    "float64 C=-.5e-3": -0.0005,
+    "string C=1.50 # of firmware": "1.50",
+    "string C=true": "true",
+    "string C=a=b": "a=b",
+}
+
+
+@pytest.mark.parametrize(("line", "value"), CONSTANTS.items())
+def test_a_constant_is_of_its_type(registry: TypeRegistry, line: str, value: object) -> None:
+    registry.add_message("lab_msgs/msg/Right", f"uint8 a\n{line}\n")
+    constant = registry.message("lab_msgs/Right").cls.C
+    assert (type(constant), constant) == (type(value), value)
+
+
+@pytest.mark.parametrize(
+    "line",
+    ["uint8 C=256", "char C=-1", "int8 C=one", "uint8 C=1.5", "bool C=maybe", "bool C=2", "float32 C=inf"],
+)
+def test_a_constant_of_another_type_is_named(registry: TypeRegistry, line: str) -> None:
+    with pytest.raises(FileError, match="is no value of the constant C") as caught:
+        registry.add_message("lab_msgs/msg/Wrong", f"uint8 a\n{line}\n")
+    assert caught.value.line == 2
 
 
 def test_lines_of_a_service_are_counted_through(registry: TypeRegistry) -> None:

@@ -39,7 +39,7 @@ def test_a_missing_router(endpoint: str) -> None:
         "board",
         "--router",
         endpoint,
-        says=(f"no Zenoh router at {endpoint}", "start one with `reconros router`"),
+        says=(f"no Zenoh router at {endpoint}", f"start one with `reconros router --listen {endpoint}`"),
     )
 
 
