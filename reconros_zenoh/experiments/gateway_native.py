@@ -248,8 +248,8 @@ def _process(role: Role) -> Iterator[Connection]:
     finally:
         here.close()
         process.join(_LIMIT_S)
-        if process.is_alive():
-            process.terminate()
+        process.kill()  # one that is stopped (Ctrl-Z) would hear nothing else, and Python wait for its end
+        process.join()
 
 
 def _play(function: Callable[..., None], connection: Connection, *arguments: object) -> None:
