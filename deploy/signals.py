@@ -7,10 +7,10 @@ import threading
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
+from reconros_zenoh.clock.signals import ENDING
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
-
-_NUMBERS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 class EndingSignals:
@@ -18,7 +18,8 @@ class EndingSignals:
 
     The first one raises what the handler before it raises, else KeyboardInterrupt (SIGINT) or
     SystemExit(128 + number): at once, or at the end of `held()` when it comes within. Further ones are only
-    counted, so that they cannot interrupt the clean-up that the first one began. `wake` is called for each,
+    counted, so that they cannot interrupt the clean-up that the first one began, and of SIGHUP not even that:
+    a terminal that closes sends several, and nobody there is in a hurry. `wake` is called for each,
     from a signal handler: it must be reentrant. A signal that the process ignores stays ignored. Thread rule:
     only the main thread can take signals; in another one this object does nothing.
     """
@@ -39,7 +40,7 @@ class EndingSignals:
         """Take the signals over."""
         if threading.current_thread() is not threading.main_thread():
             return
-        for number in _NUMBERS:
+        for number in ENDING:
             if signal.getsignal(number) is not signal.SIG_IGN:
                 self._former[number] = signal.signal(number, self._receive)
 
@@ -60,9 +61,9 @@ class EndingSignals:
         self._raise_pending()
 
     def _receive(self, number: int, _frame: object) -> None:
-        self.count += 1
-        if self.count == 1:
+        if not self.count:
             self._pending = signal.Signals(number)
+        self.count += number != signal.SIGHUP or not self.count
         self._wake()
         if not self._held:
             self._raise_pending()

@@ -74,15 +74,23 @@ class StateFolder:
                     f"Stop it first: reconros down -f {self._compose_file}"
                 ) from None
             # Stands until `leave` replaces it, so it tells what is true if that never happens.
-            self.leave({}, "The process that ran it was killed.")
+            self.leave({}, "The process that ran it was killed, or found no room to write how it ended.")
             yield
 
     def leave(self, states: Mapping[str, str], error: str) -> None:
-        """Record how the owner, this process, leaves the deployment."""
+        """Record how the owner, this process, leaves the deployment; raise FileError if it cannot."""
         record = DeploymentRecord(str(self._compose_file.resolve()), states, error)
         new = self._record.with_suffix(".new")
-        new.write_text(json.dumps(asdict(record)), encoding="utf-8")
-        new.replace(self._record)  # at once, so that nobody reads half a record
+        try:
+            new.write_text(json.dumps(asdict(record)), encoding="utf-8")
+            new.replace(self._record)  # at once, so that nobody reads half a record
+        except OSError as failure:
+            raise FileError(
+                new,
+                None,
+                f"cannot be written ({failure.strerror}).",
+                "Make room, or set XDG_STATE_HOME to another folder.",
+            ) from None
 
     def end_owner(self) -> DeploymentRecord | None:
         """Stop the deployment if it is running; return its last record and forget it.

@@ -11,6 +11,7 @@ import os
 import signal
 import subprocess
 import sys
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,7 +19,7 @@ from deploy.compose import read_compose
 from deploy.runner import LocalRunner
 from deploy.service_run import ServiceState
 from deploy.state import StateFolder
-from reconros_zenoh.errors import ExperimentError, ReconrosError, UsageError
+from reconros_zenoh.errors import ExperimentError, FileError, ReconrosError, UsageError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
     from deploy.compose import Deployment
 
 _USAGE_STATUS = 2
+_STOPPED_STATUS = 128 + signal.SIGTERM
 
 
 def supervise(
@@ -52,7 +54,8 @@ def supervise(
             error = str(failure)
             raise
         finally:
-            folder.leave(runner.states, error)
+            with suppress(FileError):  # then what it says since the start stands
+                folder.leave(runner.states, error)
 
 
 def start_supervisor(
@@ -63,7 +66,8 @@ def start_supervisor(
 ) -> None:
     """Run the deployment in a process of its own; return when all services are ready.
 
-    Raise what `supervise` raises. When this process is interrupted or dies before, everything is stopped.
+    Raise what `supervise` raises, KeyboardInterrupt when it is stopped before. When this process is
+    interrupted or dies before, everything is stopped.
     """
     folder.make()
     log = folder.path / "supervisor.log"
@@ -89,6 +93,8 @@ def start_supervisor(
     if "ready" in message:
         return
     status = process.wait()
+    if status == _STOPPED_STATUS:  # by `down`, as one in the foreground
+        raise KeyboardInterrupt
     if "error" not in message:
         raise ExperimentError(f"The supervisor of {file} ended with status {status}. Its log is {log}.")
     raise (UsageError if status == _USAGE_STATUS else ExperimentError)(message["error"])
@@ -116,8 +122,9 @@ def _main(file: Path) -> int:
             on_ready=parent.tell_ready,
         )
     except ReconrosError as error:
-        print(error, file=sys.stderr)  # for its log: the parent may have gone
         parent.tell(error=str(error))
+        with suppress(OSError):  # of a full disk
+            print(error, file=sys.stderr)  # for its log: the parent may have gone
         return _USAGE_STATUS if isinstance(error, UsageError) else 1
     return 0
 

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from reconros_zenoh.transport.base import Request, Transport
 
 _LOOK_NS = 1_000_000_000
+_LONGEST_QUESTION = 10_000
 
 
 class _Wanted(BaseModel):
@@ -77,6 +78,8 @@ class GatewayServer:
 
     def _add(self, payload: memoryview) -> str | None:
         """Add the gateway that is asked for, if any; return what is odd about it."""
+        if len(payload) > _LONGEST_QUESTION:  # to read it would keep the board, and the answer would quote it
+            raise UsageError(f"no request: it has {len(payload)} bytes.")
         question = _Question.model_validate(msgpack.unpackb(payload))
         if question.version != VERSION:
             raise UsageError(f"board {self._board.name!r} speaks version {VERSION} of the gateway.")

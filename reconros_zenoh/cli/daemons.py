@@ -28,6 +28,7 @@ from reconros_zenoh.cli.options import (
     TraceFile,
 )
 from reconros_zenoh.cli.status_screen import print_status
+from reconros_zenoh.clock.signals import ending_signals
 from reconros_zenoh.experiments.roundtrip import application_folder
 from reconros_zenoh.transport.zenoh import ZenohRouter, ZenohTransport
 from reconros_zenoh.transport.zenoh_session import use_threads_of_a_router
@@ -56,7 +57,7 @@ def router(
     Any rmw_zenoh router serves as well.
     """
     use_threads_of_a_router()
-    endings = {signal.SIGINT, signal.SIGTERM}
+    endings = ending_signals()
     # `sigwait` only takes signals that are blocked, in Zenoh's threads too.
     signal.pthread_sigmask(signal.SIG_BLOCK, endings)
     # A thread that was there before the mask may take a signal that comes just before or after the wait.

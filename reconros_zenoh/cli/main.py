@@ -6,17 +6,16 @@ import importlib
 import json
 import logging
 import math
-import os
 import signal
 import sys
 import time
-from io import TextIOWrapper
-from pathlib import Path
 from typing import NoReturn
 
 import typer
 
 from reconros_zenoh.cli.printable import printable
+from reconros_zenoh.cli.streams import drop_output, open_streams
+from reconros_zenoh.clock.signals import ending_signals
 from reconros_zenoh.errors import ReconrosError, TransportError, UsageError
 
 _FINISHING_S = 5.0
@@ -53,15 +52,15 @@ def main() -> None:
 
     Status 0: it did what was asked (router and board: until a signal came); 1: an experiment failed, or an
     answer was wrong or lost, or the output could not be written; 2: what was given cannot be used; 130:
-    ended by Ctrl-C or SIGTERM before its end. With --json an error is `{"error": ...}` on stdout, too.
+    ended by Ctrl-C, SIGTERM or SIGHUP before its end. With --json an error is `{"error": ...}` on stdout,
+    too.
     """
-    _open_closed_streams()
-    if isinstance(sys.stdout, TextIOWrapper) and sys.stdout.errors == "strict":
-        sys.stdout.reconfigure(errors="backslashreplace")  # a path may have what the terminal has not
+    open_streams()
     _log_to_stderr()
     logging.getLogger("matplotlib").setLevel(logging.ERROR)  # where its fonts are is nobody's concern
     ending = _Ending()
-    for number in (signal.SIGINT, signal.SIGTERM):
+    endings = ending_signals()
+    for number in endings:
         signal.signal(number, ending)
     # A verb imports what it needs itself: the others' imports would double its start.
     given = sys.argv[1] if len(sys.argv) > 1 else ""
@@ -81,16 +80,16 @@ def main() -> None:
     except KeyboardInterrupt:
         sys.exit(130)
     except BrokenPipeError:  # whoever read our output has had enough
-        _drop_output()
+        drop_output()
         sys.exit(1)
     except OSError as error:  # a full disk, for example
-        _drop_output()
+        drop_output()
         place = error.filename or "the output cannot be written"
         print(f"reconros: {place}: {error.strerror}", file=sys.stderr)
         sys.exit(1)
     finally:
         # Python gives its handlers back before it ends: a second signal would kill it and change the status.
-        for number in (signal.SIGINT, signal.SIGTERM):
+        for number in endings:
             signal.signal(number, signal.SIG_IGN)
 
 
@@ -143,20 +142,8 @@ def _log_to_stderr() -> None:
     logging.basicConfig(level=logging.INFO, handlers=[handler])
 
 
-def _drop_output() -> None:
-    """Let what is still to be written to stdout go nowhere: Python would complain at its exit."""
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-
-
-def _open_closed_streams() -> None:
-    """Let what nobody reads or writes be /dev/null: a file that is opened later would get its number."""
-    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
-        if getattr(sys, name) is None:
-            setattr(sys, name, Path(os.devnull).open(mode, encoding="utf-8"))  # noqa: SIM115 # until the end
-
-
 class _Ending:
-    """Ends on SIGTERM as on Ctrl-C: through every `finally`.
+    """Ends on SIGTERM and SIGHUP as on Ctrl-C: through every `finally`.
 
     For some seconds further signals are ignored, so that what was measured can be written: a second Ctrl-C,
     or the second signal of `timeout`, which sends one to the process and one to its group.

@@ -10,6 +10,7 @@ import sys
 from functools import cache
 from typing import TYPE_CHECKING
 
+from reconros_zenoh.clock.signals import ending_signals
 from reconros_zenoh.clock.virtual import succeed_once
 from reconros_zenoh.clock.wall import WallEnvironment
 
@@ -31,13 +32,13 @@ _OBJECTS_BETWEEN_COLLECTIONS = 50_000
 def begin_process() -> tuple[WallEnvironment, simpy.Event]:
     """Tune this process and return its event loop, with the event that ends it.
 
-    SIGINT and SIGTERM make the event happen from now on, instead of anything else. For processes that run
-    until they are told to end; called by the main thread.
+    The signals that end a process make the event happen from now on, instead of anything else. For processes
+    that run until they are told to end; called by the main thread.
     """
     tune_process()
     environment = WallEnvironment()
     ending = environment.event()
-    for number in (signal.SIGINT, signal.SIGTERM):
+    for number in ending_signals():
         signal.signal(number, lambda *_: environment.post(succeed_once, ending))
     return environment, ending
 

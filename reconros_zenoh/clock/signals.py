@@ -1,4 +1,4 @@
-"""Signals that come while an event loop runs."""
+"""The signals that ask a process to end, and those that come while an event loop runs."""
 
 from __future__ import annotations
 
@@ -11,12 +11,21 @@ from typing import TYPE_CHECKING, Any, cast
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
+ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+"""Ctrl-C, the signal of `kill`, and that of a terminal that closes."""
+
 _LONGEST_EVENT_S = 1.0
+
+
+def ending_signals() -> tuple[signal.Signals, ...]:
+    """Return the signals that end this process: not SIGHUP where that is ignored, as with `nohup`."""
+    kept = {signal.SIGHUP} if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN else set()
+    return tuple(number for number in ENDING if number not in kept)
 
 
 @contextmanager
 def handled_between_events(call_next: Callable[[Callable[[], None]], None]) -> Iterator[None]:
-    """Have the handlers of SIGINT and SIGTERM called by the event loop that runs in the block.
+    """Have the handlers of the ending signals called by the event loop that runs in the block.
 
     They raise an exception, as Python's own does for Ctrl-C; raised wherever the model happens to be, it
     could be lost in a finalizer. `call_next` has the loop call something as its next event; it must be
@@ -40,7 +49,7 @@ def handled_between_events(call_next: Callable[[Callable[[], None]], None]) -> I
             handlers[number](number, frame)
 
     if threading.current_thread() is threading.main_thread():
-        for number in (signal.SIGINT, signal.SIGTERM):
+        for number in ENDING:
             handler = signal.getsignal(number)
             if callable(handler):
                 handlers[number] = handler

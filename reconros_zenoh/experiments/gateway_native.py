@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar, get_args
 from reconros_zenoh.errors import ExperimentError
 from reconros_zenoh.experiments.gateway import Cell, Times, Variant
 from reconros_zenoh.experiments.gateway_processes import run_board, run_listener, run_publisher
-from reconros_zenoh.experiments.interruption import sigint_blocked, until_interrupted
+from reconros_zenoh.experiments.interruption import terminal_signals_blocked, until_interrupted
 from reconros_zenoh.experiments.provenance import host
 from reconros_zenoh.experiments.wall import free_port
 from reconros_zenoh.mapping.graph import Side
@@ -240,7 +240,7 @@ def _process(role: Role) -> Iterator[Connection]:
     spawn = multiprocessing.get_context("spawn")
     here, there = spawn.Pipe()
     process = spawn.Process(target=_play, args=(function, there, *arguments), daemon=True)
-    with sigint_blocked():
+    with terminal_signals_blocked():
         process.start()
     there.close()
     try:
@@ -248,8 +248,8 @@ def _process(role: Role) -> Iterator[Connection]:
     finally:
         here.close()
         process.join(_LIMIT_S)
-        if process.is_alive():
-            process.terminate()
+        process.kill()  # one that is stopped (Ctrl-Z) would hear nothing else, and Python wait for its end
+        process.join()
 
 
 def _play(function: Callable[..., None], connection: Connection, *arguments: object) -> None:

@@ -14,29 +14,30 @@ if TYPE_CHECKING:
 
 @dataclass(slots=True)
 class Interruption:
-    """Whether Ctrl-C or SIGTERM has ended a block."""
+    """Whether a signal that asks to end has ended a block."""
 
     happened: bool = False
 
 
 @contextmanager
 def until_interrupted() -> Iterator[Interruption]:
-    """Run the block to its end or to Ctrl-C or SIGTERM, so that what was measured is kept."""
+    """Run the block to its end or to a signal that asks to end, so that what was measured is kept."""
     interruption = Interruption()
     try:
         yield interruption
-    except (KeyboardInterrupt, SystemExit):  # the latter is SIGTERM while a deployment runs (`LocalRunner`)
+    except (KeyboardInterrupt, SystemExit):  # the latter is no Ctrl-C while a deployment runs (`LocalRunner`)
         interruption.happened = True
 
 
 @contextmanager
-def sigint_blocked() -> Iterator[None]:
+def terminal_signals_blocked() -> Iterator[None]:
     """Start processes in the block: they never hear Ctrl-C, not even before their first line of Python.
 
-    A terminal sends it to all of them, and this one, which hears it after the block, ends them.
+    Nor do they hear SIGHUP. A terminal sends both to all processes; this one, which hears them after the
+    block, ends the others.
     """
     resource_tracker.ensure_running()  # the first process would start it, which unblocks SIGINT
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT, signal.SIGHUP])
     try:
         yield
     finally:

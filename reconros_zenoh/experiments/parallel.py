@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple, Self
 import numpy as np
 
 from reconros_zenoh.errors import ExperimentError
-from reconros_zenoh.experiments.interruption import sigint_blocked
+from reconros_zenoh.experiments.interruption import terminal_signals_blocked
 from reconros_zenoh.experiments.roundtrip import CLIENTS
 from reconros_zenoh.experiments.virtual import run_mapping
 from reconros_zenoh.measure.record import Record
@@ -54,7 +54,7 @@ class ParallelRuns:
         Raise ExperimentError if a process was ended from outside.
         """
         try:
-            with sigint_blocked():
+            with terminal_signals_blocked():
                 records = self._pool.map(records_of, runs)
             yield from records
         except BrokenProcessPool:

@@ -108,6 +108,7 @@ class RecordWriter:
         except OSError as error:
             raise self._failure(str(error.strerror)) from error
         if written < len(data):
+            self._file.truncate(self._file.tell() - written)  # half a line would make the record unreadable
             raise self._failure("the disk is full")
 
     def _failure(self, reason: str) -> ExperimentError:

@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from reconros_zenoh.transport.base import OnMatching, OnReply, Parts, Request
 
 _HEARTBEAT_S = 0.5
+_NOBODY_THERE = "Unable to connect"
 
 
 class ZenohRouter(Closing):
@@ -85,7 +86,8 @@ class ZenohTransport(Closing):
 
         With a router on the loopback it is a peer, as in rmw_zenoh. With any other it is a client,
         which listens nowhere: the router passes everything on.
-        Raises TransportError when no router answers, UsageError when `router` is not an endpoint.
+        Raises TransportError when no router answers or this host lacks something, UsageError when `router` is
+        not an endpoint.
         """
         if is_of_this_host(router):
             config = configuration(
@@ -99,9 +101,12 @@ class ZenohTransport(Closing):
         try:
             return cls(open_session(config))
         except zenoh.ZError as error:
-            raise TransportError(
-                f"no Zenoh router at {router}: start one with `reconros router --listen {router}`"
-            ) from error
+            if str(error).startswith(_NOBODY_THERE):
+                problem = f"no Zenoh router at {router}: start one with `reconros router --listen {router}`"
+            else:
+                remedy = "See what this host lacks: `ulimit -a`, `df /dev/shm`."
+                problem = f"no Zenoh session can be opened: {_reason(error)}. {remedy}"
+            raise TransportError(problem) from error
 
     def publish(self, key: str, qos: QosProfile, on_matching: OnMatching | None = None) -> _Publisher:
         """Declare a publisher, see `Transport.publish`."""

@@ -11,6 +11,8 @@ import threading
 from contextlib import suppress
 from functools import cache
 from ipaddress import ip_address
+from pathlib import Path
+from shutil import disk_usage
 from typing import TYPE_CHECKING, TypeVar
 
 import zenoh
@@ -39,6 +41,10 @@ _SHARED_FROM = 32 * 1024
 
 # What a process may have to map: its own pools, and those of several peers.
 _LOCKED_BYTES = 1 << 30
+
+# Where it is, and what must be left there: a session makes some segments of a few kB before its pools.
+_SHARED_MEMORY = Path("/dev/shm")  # noqa: S108 # only looked at
+_ROOM_BYTES = 1 << 20
 
 # How long [us] a message, and all fragments of a large one, wait for room on a link before they are dropped.
 # In Zenoh's own 1 and 50 ms no image gets to a host behind 100 Mbit/s. What must not be dropped waits 5 s,
@@ -103,7 +109,8 @@ def has_shared_memory() -> bool:
     """
     if sys.platform != "linux":
         return True
-    return os.access("/dev/shm", os.W_OK) and can_lock(_LOCKED_BYTES)  # noqa: S108 # only looked at
+    is_usable = os.access(_SHARED_MEMORY, os.W_OK)
+    return is_usable and disk_usage(_SHARED_MEMORY).free >= _ROOM_BYTES and can_lock(_LOCKED_BYTES)
 
 
 def is_of_this_host(endpoint: str) -> bool:

@@ -110,6 +110,7 @@ def test_a_gateway_is_added_with_its_qos() -> None:
         (msgpack.packb({"version": VERSION, "add": 5}), "no request"),
         (msgpack.packb(5), "no request"),
         (b"\xc1", "no request"),
+        (bytes(10_001), "no request: it has 10001 bytes"),
     ],
 )
 def test_what_cannot_be_added_is_refused_and_changes_nothing(question: bytes, words: str) -> None:

@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import threading
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -18,6 +19,7 @@ from deploy.child import local_command
 from deploy.compose import ComposeService, Healthcheck
 from deploy.runner import LocalRunner
 from deploy.service_run import ServiceState
+from deploy.signals import EndingSignals
 from reconros_zenoh.errors import ExperimentError, FileError, UsageError
 
 if TYPE_CHECKING:
@@ -378,6 +380,18 @@ def test_a_signal_to_the_runner_stops_all(services: Services, number: signal.Sig
         assert process.returncode == STATUS[number], errors
     assert children
     assert not psutil.wait_procs(children, timeout=30)[1]
+
+
+def test_a_terminal_that_closes_is_in_no_hurry() -> None:
+    signals = EndingSignals(wake=lambda: None)
+    signals.install()
+    try:
+        with suppress(SystemExit), signals.held():
+            for _ in range(3):  # the shell's, and that of the kernel when the shell has ended
+                signal.raise_signal(signal.SIGHUP)
+    finally:
+        signals.restore()
+    assert signals.count == 1
 
 
 def test_a_second_signal_is_not_patient(services: Services) -> None:

@@ -219,6 +219,19 @@ def test_down_stops_a_foreground_up_too(services: Services, start: Start, run: R
     services.assert_gone()
 
 
+def test_down_stops_a_detached_up_that_waits_for_health_too(
+    services: Services, start: Start, run: Run
+) -> None:
+    services.compose_file(services.service("server", "block()", services.when_written("never")))
+    with start("up", "-d") as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "server: started\n"
+        assert run("down").stdout == "server: stopped\n"
+        _, errors = process.communicate()
+        assert (process.returncode, errors) == (130, "")
+    services.assert_gone()
+
+
 def test_up_detached_that_fails_leaves_nothing(services: Services, run: Run) -> None:
     never = Healthcheck(("false",), 10**6, retries=1)
     services.compose_file(
@@ -301,6 +314,30 @@ def test_a_state_folder_that_cannot_be_made_is_told(tmp_path: Path) -> None:
     folder = StateFolder(tmp_path / "compose.yaml", {"XDG_STATE_HOME": str(tmp_path / "file")})
     with pytest.raises(FileError, match="Set XDG_STATE_HOME"):
         folder.make()
+
+
+@pytest.mark.parametrize("options", [[], ["-d"]], ids=["foreground", "detached"])
+def test_a_full_disk_below_the_state_is_told(services: Services, run: Run, options: list[str]) -> None:
+    _server_and(services, "block()")
+    state = StateFolder(services.folder / "compose.yaml", {"XDG_STATE_HOME": str(services.folder / "state")})
+    state.make()
+    (state.path / "record.new").symlink_to("/dev/full")
+    (state.path / "supervisor.log").symlink_to("/dev/full")
+    up = run("up", *options)
+    assert (up.returncode, up.stdout) == (2, "")
+    assert up.stderr == (
+        f"{state.path / 'record.new'}: cannot be written (No space left on device). "
+        "Make room, or set XDG_STATE_HOME to another folder.\n"
+    )
+
+
+def test_a_disk_that_gets_full_does_not_hide_what_failed(services: Services, run: Run) -> None:
+    state = StateFolder(services.folder / "compose.yaml", {"XDG_STATE_HOME": str(services.folder / "state")})
+    program = f"pathlib.Path({str(state.path)!r}, 'record.new').symlink_to('/dev/full'); sys.exit(9)"
+    services.compose_file(services.service("server", program))
+    up = run("up")
+    assert (up.returncode, up.stderr.splitlines()[0]) == (1, "Service server ended with status 9.")
+    assert "found no room to write how it ended" in run("down").stdout
 
 
 def test_files_of_one_name_have_states_of_their_own(tmp_path: Path) -> None:

@@ -148,11 +148,13 @@ def test_a_full_disk_ends_the_experiment(tmp_path):
         RecordWriter(Path("/dev/full"))
 
 
-def test_a_line_of_which_the_disk_takes_a_part_ends_the_experiment(tmp_path, monkeypatch):
+def test_a_line_of_which_the_disk_takes_a_part_ends_the_experiment_and_is_left_out(tmp_path, monkeypatch):
     with RecordWriter(tmp_path / "sort.csv") as writer, monkeypatch.context() as patched:
-        patched.setattr(writer, "_file", FullAfter(3))
+        file = FullAfter(3)
+        patched.setattr(writer, "_file", file)
         with pytest.raises(ExperimentError, match="the disk is full"):
             writer.write(RoundTrip(0, 1_000_000, "ok"))
+        assert file.getvalue() == b""
 
 
 class FullAfter(io.BytesIO):

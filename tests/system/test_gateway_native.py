@@ -5,16 +5,19 @@ from __future__ import annotations
 import itertools
 import json
 import multiprocessing
+import os
 import subprocess
 import sys
 from contextlib import ExitStack
-from signal import SIG_BLOCK, SIGINT, pthread_sigmask
+from signal import SIG_BLOCK, SIGHUP, SIGINT, SIGSTOP, pthread_sigmask
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import psutil
 import pytest
 
 from reconros_zenoh.errors import ExperimentError
+from reconros_zenoh.experiments import gateway_native
 from reconros_zenoh.experiments.gateway_native import Setup, _process, take_turns
 from reconros_zenoh.experiments.gateway_processes import Receiver
 
@@ -85,9 +88,21 @@ def tell_signal_mask(connection: Connection) -> None:
     connection.send(pthread_sigmask(SIG_BLOCK, ()))
 
 
-def test_its_processes_leave_ctrl_c_to_the_experiment() -> None:
+def test_its_processes_leave_the_signals_of_a_terminal_to_the_experiment() -> None:
     with _process((tell_signal_mask, ())) as connection:
-        assert SIGINT in connection.recv()
+        assert connection.recv() >= {SIGINT, SIGHUP}
+
+
+def stop(connection: Connection) -> None:
+    connection.send(os.getpid())
+    os.kill(os.getpid(), SIGSTOP)
+
+
+def test_a_process_that_is_stopped_does_not_outlive_the_experiment(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(gateway_native, "_LIMIT_S", 0.1)
+    with _process((stop, ())) as connection:
+        number = connection.recv()
+    assert not psutil.pid_exists(number)
 
 
 def test_too_many_lost_messages_end_the_experiment() -> None:

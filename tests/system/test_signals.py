@@ -1,10 +1,10 @@
-"""Ctrl-C and SIGTERM end each process well; a router that goes takes nobody with it."""
+"""Ctrl-C, SIGTERM and SIGHUP end each process well; a router that goes takes nobody with it."""
 
 from __future__ import annotations
 
 import os
 import time
-from signal import SIGINT, SIGKILL, SIGTERM, Signals
+from signal import SIGINT, SIGKILL, Signals
 from threading import Condition
 from typing import TYPE_CHECKING
 
@@ -12,6 +12,7 @@ import pytest
 from processes import LIMIT_S, Process
 
 from reconros_zenoh.board.control import ask_status
+from reconros_zenoh.clock.signals import ENDING
 from reconros_zenoh.errors import TransportError
 from reconros_zenoh.ros.names import data_key
 from reconros_zenoh.ros.qos import QosProfile
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
     from reconros_zenoh.ros.types import TypeRegistry
     from reconros_zenoh.transport.base import Sample
 
-both_signals = pytest.mark.parametrize("number", [SIGINT, SIGTERM], ids=lambda number: number.name)
+each_signal = pytest.mark.parametrize("number", ENDING, ids=lambda number: number.name)
 ENDLESS = "--requests=1000000"
 
 
@@ -65,7 +66,7 @@ def outcomes(record: Path, client: Process) -> list[str]:
     return found
 
 
-@both_signals
+@each_signal
 def test_an_interrupted_client_keeps_its_record(
     network: Network, types: TypeRegistry, tmp_path: Path, number: Signals
 ) -> None:
@@ -79,7 +80,7 @@ def test_an_interrupted_client_keeps_its_record(
         assert client.err == []
 
 
-@both_signals
+@each_signal
 @pytest.mark.parametrize("earlier", [0, 1])
 def test_router_and_board_end_without_complaint(endpoint: str, number: Signals, earlier: int) -> None:
     with (
