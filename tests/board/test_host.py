@@ -128,11 +128,12 @@ def test_a_computation_that_fails_late_is_an_overrun_too() -> None:
         assert host.overruns.count == 1
 
 
-def test_a_closed_host_starts_nothing_more() -> None:
+def test_the_hosts_of_a_closed_board_start_nothing_more() -> None:
     board = small_board(small_profile(), environment=WallEnvironment(), threads=1)
     board.close()
-    with pytest.raises(RuntimeError, match="the pool of threads is closed"):
-        board.host.start("task", max, 1, 2)
+    for host in (board.host, board.sending_host):
+        with pytest.raises(RuntimeError, match="the pool of threads is closed"):
+            host.start("task", max, 1, 2)
 
 
 def test_two_computations_run_at_the_same_time_in_wall_time() -> None:
