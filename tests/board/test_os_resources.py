@@ -139,12 +139,13 @@ def test_one_at_a_time_holds_a_mutex_in_the_order_of_coming() -> None:
     assert [when for when, _ in log] == [1007, 6007, 6014, 11014, 11021, 16021]
 
 
-def test_a_failed_callback_gives_its_mutex_back(caplog: pytest.LogCaptureFixture) -> None:
+@pytest.mark.parametrize("call", ["mutex_lock", "mutex_trylock"])
+def test_a_failed_callback_gives_its_mutex_back(call: str, caplog: pytest.LogCaptureFixture) -> None:
     log: Log = []
     mutex: list[Mutex] = []
 
     def fails(thread: HardwareThread) -> Steps:
-        yield from thread.mutex_lock(mutex[0])
+        yield from getattr(thread, call)(mutex[0])
         yield from thread.compute_cycles(5000)
         raise ValueError
 
