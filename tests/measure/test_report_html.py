@@ -157,7 +157,7 @@ def test_a_run_that_was_stopped_at_once_still_has_a_report(tmp_path):
 def test_the_report_replaces_an_older_one_or_leaves_it(tmp_path):
     records = {"mine": {"x": Record("x", np.array([1.0, 2.0]))}}
     run = (experiment_of(records), records)
-    path = tmp_path / "deep" / "report.html"
+    path = tmp_path / "as" / "deep" / "report.html"
     written(path, run)
     path.write_text("older")
     written(path, run)
