@@ -284,6 +284,5 @@ class TimerSource(Source):
             yield environment.timeout(self._period_ns)
             if self._queue:
                 self._dropped += 1
-                self._on_ready()
             else:
                 self.enqueue(Event(None, Timeline(environment, environment.now)))

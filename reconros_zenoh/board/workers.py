@@ -152,7 +152,7 @@ class SoftwareWorker(Worker):
             future_and_time = host.start(task, measured, function, event.message, context, limit=limit)
             response, took_ns = yield from host.result(future_and_time)
             left_ns = round(took_ns * time.factor) - (self._environment.now - started_ns)
-            yield from board.cpu.run(max(0, left_ns))
+            yield from board.cpu.run(left_ns)
             timeline.mark("execution")
         return response
 

@@ -156,8 +156,9 @@ def _check_ends(configuration: BuildConfiguration, topic: str, ends: list[Resour
                 f"{topic} has the type {end.interface} here and {ends[0].interface} in line {ends[0].line}.",
                 "A topic has one type.",
             )
-    publishers = [end for end in ends if end.type == "rospub" and end.fifo.message_bytes is not None]
-    for publisher, subscriber in product(publishers, (end for end in ends if end.type == "rossub")):
+    publishers = (end for end in ends if end.type == "rospub")
+    subscribers = (end for end in ends if end.type == "rossub")
+    for publisher, subscriber in product(publishers, subscribers):
         held, sent = subscriber.fifo.message_bytes, publisher.fifo.message_bytes
         if held is not None and sent is not None and sent > held:
             raise FileError(

@@ -88,6 +88,22 @@ def in_hardware(case: Serving) -> Any:
     return callback
 
 
+def test_a_goal_is_executing_once_its_callback_has_begun() -> None:
+    states: list[GoalStatus] = []
+
+    def notes(case: Serving) -> Any:
+        def callback(goal: GoalHandle, _: SoftwareContext) -> Any:
+            states.append(goal.status)
+            return case.source.result(sequence=fibonacci(1))
+
+        return callback
+
+    case = Serving(notes, hardware=False)
+    case.send(1)
+    case.run()
+    assert states == [GoalStatus.EXECUTING]
+
+
 @pytest.mark.parametrize(("callback", "hardware"), [(in_software, False), (in_hardware, True)])
 def test_a_goal_is_served(callback: Any, hardware: bool) -> None:
     case = Serving(callback, hardware=hardware)

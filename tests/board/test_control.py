@@ -346,11 +346,13 @@ def test_the_status_of_a_board_that_answers(monkeypatch: pytest.MonkeyPatch) -> 
         msgpack.packb({name: told for name, told in status(*board_that_ran()).items() if name != "use"}),
         msgpack.packb({**status(*board_that_ran()), "slots": {}}),
         msgpack.packb({**status(*board_that_ran()), "rejected": {"a": "b"}}),
+        msgpack.packb({**status(*board_that_ran()), "elapsed_ms": "1"}),
+        msgpack.packb({**status(*board_that_ran()), "elapsed_ms": float("nan")}),
         msgpack.packb({**status(*board_that_ran()), "profile": "\x1b]0;mine\x07"}),
         msgpack.packb({**status(*board_that_ran()), "rejected": {"\x1b[2J": 1}}),
         msgpack.packb({**status(*board_that_ran()), "more": bytes(10_000_000)}),
     ],
-    ids=range(12),
+    ids=range(14),
 )
 def test_what_is_no_status_is_said_to_be_none(answer: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(

@@ -72,6 +72,14 @@ def test_a_callback_in_software(caplog: pytest.LogCaptureFixture) -> None:
     assert [timeline.age_ns for timeline in source.timelines] == [100, 190]
 
 
+def test_a_callback_that_fails_before_any_time_has_passed(caplog: pytest.LogCaptureFixture) -> None:
+    board = small_board(small_profile({"a": (0, 0)}))
+    _, source = software_board(board)
+    source.put(0)
+    board.environment.run(until=1)
+    assert caplog.messages == ["callback a failed after 0 ms; a failure of this kind is not reported again"]
+
+
 @pytest.mark.parametrize("when", ["before the computation", "in the kernel", "after it"])
 def test_a_callback_in_hardware(when: str, caplog: pytest.LogCaptureFixture) -> None:
     def thread(thread: HardwareThread) -> Steps:

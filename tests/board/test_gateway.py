@@ -274,6 +274,13 @@ def test_with_a_short_queue_it_keeps_the_newest() -> None:
     assert side.numbers() == [[0, 1, 4], [0, 1, 4], [0, 1, 2, 3, 4]]
 
 
+def test_it_takes_no_slot_of_a_callback() -> None:
+    board = small_board(modelled(), 1)
+    board.slots[0].admit("loaded")
+    with pytest.raises(UsageError, match=r"'g' cannot be in slot 0, which is for loaded\. Give one of them"):
+        board.add_gateway("g", "/a", "/a", words, 0)
+
+
 def test_a_profile_must_know_gateways() -> None:
     profile = modelled()
     assert profile.model is not None

@@ -12,7 +12,7 @@ import pytest
 from small_board import Tickets, small_board, small_profile, start
 
 from reconros_zenoh.board.executor import Executor
-from reconros_zenoh.board.host import Host, Overruns
+from reconros_zenoh.board.host import Host, Overruns, computed
 from reconros_zenoh.clock.virtual import VirtualEnvironment
 from reconros_zenoh.clock.wall import WallEnvironment
 from reconros_zenoh.executor.callbacks import CallbackKind
@@ -128,11 +128,12 @@ def test_a_computation_that_fails_late_is_an_overrun_too() -> None:
         assert host.overruns.count == 1
 
 
-def test_a_closed_host_starts_nothing_more() -> None:
+def test_the_hosts_of_a_closed_board_start_nothing_more() -> None:
     board = small_board(small_profile(), environment=WallEnvironment(), threads=1)
     board.close()
-    with pytest.raises(RuntimeError, match="the pool of threads is closed"):
-        board.host.start("task", max, 1, 2)
+    for host in (board.host, board.sending_host):
+        with pytest.raises(RuntimeError, match="the pool of threads is closed"):
+            host.start("task", max, 1, 2)
 
 
 def test_two_computations_run_at_the_same_time_in_wall_time() -> None:
@@ -222,6 +223,15 @@ def test_in_wall_time_a_model_computes_what_nobody_can_change_once(modelled: boo
     assert [host.compute(kernel, source) for _ in range(2)] == [3, 3]
     assert kernel.calls == calls
     host.close()
+
+
+def test_of_what_a_kernel_returns_only_what_it_was_given_is_copied() -> None:
+    made, given = np.zeros(3), np.zeros(3)
+    results = computed(lambda _: (made, given), given)
+    assert results[0] is made
+    assert not np.shares_memory(results[1], given)
+    assert [result.flags.writeable for result in results] == [False, False]
+    assert given.flags.writeable
 
 
 def test_in_wall_time_what_a_message_brings_is_computed_each_time() -> None:

@@ -164,6 +164,14 @@ def test_a_reader_elsewhere_gets_it_over_the_link_and_those_here_get_it_once() -
     assert heard[0] - setup.started_ns == A + 2 * D + 50
 
 
+def test_a_publisher_elsewhere_is_no_reader() -> None:
+    setup = Setup(1)
+    desktop(setup.board).node("desk").publisher(words, "/a")
+    setup.environment.run()
+    assert setup.board.topics is not None
+    assert not setup.board.topics.is_read_elsewhere(setup.writer.key)
+
+
 def test_a_reader_that_has_gone_costs_nothing_any_more() -> None:
     setup = Setup(1)
     node = desktop(setup.board).node("desk")

@@ -139,12 +139,13 @@ def test_one_at_a_time_holds_a_mutex_in_the_order_of_coming() -> None:
     assert [when for when, _ in log] == [1007, 6007, 6014, 11014, 11021, 16021]
 
 
-def test_a_failed_callback_gives_its_mutex_back(caplog: pytest.LogCaptureFixture) -> None:
+@pytest.mark.parametrize("call", ["mutex_lock", "mutex_trylock"])
+def test_a_failed_callback_gives_its_mutex_back(call: str, caplog: pytest.LogCaptureFixture) -> None:
     log: Log = []
     mutex: list[Mutex] = []
 
     def fails(thread: HardwareThread) -> Steps:
-        yield from thread.mutex_lock(mutex[0])
+        yield from getattr(thread, call)(mutex[0])
         yield from thread.compute_cycles(5000)
         raise ValueError
 
@@ -234,19 +235,26 @@ def test_software_and_hardware_share_them() -> None:
 
     def software(message: object, context: SoftwareContext) -> None:
         got.append(context.sem_trywait(shared[1]))
+        context.sem_post(shared[3])
         got.append(context.mutex_trylock(shared[2]))
         got.append(context.mbox_tryput(shared[0], 3))
         got.append(context.now_ns)
 
     slots = Slots(a=hardware)
     environment = slots.board.environment
-    shared += [Mailbox(environment, 4), Semaphore(environment, 0), Mutex(environment)]
+    shared += [
+        Mailbox(environment, 4),
+        Semaphore(environment, 0),
+        Mutex(environment),
+        Semaphore(environment, 0),
+    ]
     source = Tickets(slots.board)
     slots.executor.add_sw_callback("b", SUB, source, software)
     source.put_at(5000, 6000)
     slots.run()
     assert got == [False, True, True, 5000, (3, None), True, True, True, True, 6000]
     assert shared[2].try_lock("anybody")  # the software callback gave it back when it ended
+    assert [shared[3].try_wait() for _ in range(3)] == [True, True, False]  # one for each of its calls
 
 
 def test_threads_of_the_host_do_not_lose_a_word() -> None:

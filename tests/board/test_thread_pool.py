@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 import threading
 from concurrent.futures import CancelledError
 
@@ -40,3 +42,14 @@ def test_what_never_ends_is_left_and_what_has_not_begun_never_does(
         waiting.result(0)
     end.set()
     assert running.result(10) is None
+
+
+def test_a_computation_that_never_ends_does_not_keep_the_process_alive() -> None:
+    program = (
+        "import threading\n"
+        "from reconros_zenoh.board.thread_pool import ThreadPool\n"
+        "begun = threading.Event()\n"
+        "ThreadPool(1, 'test').submit(lambda: (begun.set(), threading.Event().wait()))\n"
+        "assert begun.wait(30)\n"
+    )
+    subprocess.run([sys.executable, "-c", program], check=True, timeout=60)

@@ -107,6 +107,18 @@ def test_a_gateway_is_in_its_slot_while_it_works_and_not_while_its_request_stand
     assert slices(board) == [Slice("RS0", "bridge", None, 100, 200), Slice("RS0", "bridge", None, 200, 230)]
 
 
+def test_a_trace_counts_from_when_its_board_began() -> None:
+    environment = VirtualEnvironment()
+    environment.run(until=700)
+    trace = Trace(environment)
+    trace.icap.begin("a")
+    environment.run(until=710)
+    trace.icap.end()
+    trace.icap.begin("b")
+    environment.run(until=740)
+    assert list(trace.slices()) == [Slice("ICAP", "a", None, 0, 10), Slice("ICAP", "b", None, 10, 40)]
+
+
 @pytest.mark.parametrize("in_hardware", [False, True])
 def test_without_a_trace_there_is_none(in_hardware: bool) -> None:
     board = small_board(small_profile({"a": (10, 10)}), 1)

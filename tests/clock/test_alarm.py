@@ -9,8 +9,9 @@ from watched_loop import LIMIT_S, join
 from reconros_zenoh.clock.alarm import Alarm
 
 
-def test_it_rings_for_who_waits_and_for_who_comes_later_and_then_no_more() -> None:
+def test_it_is_silent_at_first_rings_for_who_waits_and_for_who_comes_later_and_then_no_more() -> None:
     alarm = Alarm()
+    assert not alarm.wait(0)
     heard: list[bool] = []
     waiting = Thread(target=lambda: heard.append(alarm.wait(LIMIT_S)), daemon=True)
     waiting.start()

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import os
 import signal
+import time
 
 import pytest
+from watched_loop import LIMIT_S
 
 from reconros_zenoh.clock.virtual import VirtualEnvironment
 
@@ -37,12 +39,32 @@ def test_a_signal_in_the_last_event_is_not_lost() -> None:
 
 
 def test_a_signal_ends_what_never_comes_back() -> None:
+    ended: list[str] = []
+
     def never_comes_back() -> None:
         os.kill(os.getpid(), signal.SIGINT)
-        while True:
+        deadline_s = time.monotonic() + LIMIT_S
+        while time.monotonic() < deadline_s:
             pass
+        ended.append("by itself")  # an error would be lost behind the KeyboardInterrupt that comes then
 
     environment = VirtualEnvironment()
     environment.post(never_comes_back)
     with pytest.raises(KeyboardInterrupt):
         environment.run()
+    assert not ended
+
+
+def test_a_second_signal_interrupts_the_event_at_once() -> None:
+    done: list[str] = []
+
+    def goes_on() -> None:
+        for place in ("after the first", "after the second"):
+            os.kill(os.getpid(), signal.SIGINT)
+            done.append(place)
+
+    environment = VirtualEnvironment()
+    environment.post(goes_on)
+    with pytest.raises(KeyboardInterrupt):
+        environment.run()
+    assert done == ["after the first"]

@@ -122,6 +122,8 @@ def test_the_report_is_one_file_with_the_pictures_in_it(folder: Path, experiment
     assert shown[-1] == last
     assert str(experiment["variants"]["one_slot"]["reconfigurations"]) in page
     assert page.count("<svg") == 1
+    slower = r"a picture takes [\d.]+ ms longer \(.*\), a servo index [\d.]+ ms longer"
+    assert re.search(slower, page)
     assert "http" not in re.sub(r"base64,[^\"]+", "", page)
 
 

@@ -92,6 +92,20 @@ def test_a_stream_between_callbacks_that_share_slots_is_noted(tmp_path: Path) ->
     assert notes((0,), (0,)) == []
 
 
+@pytest.mark.parametrize("end", ["rospub", "rossub"])
+def test_two_that_both_publish_or_both_read_join_no_stream(tmp_path: Path, end: str) -> None:
+    same = f'alike = {end}, node, image_msg, "/alike"\n'
+    marks = [f"image_msg = rosmsg, sensor_msgs, msg, Image\n{rest}" for rest in ("sub =", "int_msg =")]
+    text = CAMERA
+    for mark in marks:
+        assert mark in text
+        text = text.replace(mark, mark.replace("Image\n", f"Image\n{same}"))
+    configuration = read(tmp_path, text)
+    mapping = mapping_of(edge=(0,), lane=(0,), viewer=())
+    streams = dict.fromkeys(("/image", "/edges", "/vision/lane/found"), TopicMapping.SOFTWARE)
+    assert shared_slots(configuration, mapping, streams | {"/alike": TopicMapping.HARDWARE}) == []
+
+
 def test_a_node_with_callbacks_on_both_sides_is_a_node_on_each(tmp_path: Path) -> None:
     both = CAMERA.replace('"/vision/lane"', '"/edge"').replace("HwSource = hls\nSwSource", "SwSource")
     graph = graph_of(tmp_path, both)

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from reconros_zenoh.errors import ExperimentError, FileError, UsageError
 from reconros_zenoh.measure.record import (
     HEADER,
+    Record,
     RecordWriter,
     RoundTrip,
     find_records,
@@ -41,6 +42,9 @@ def test_what_is_written_is_read_back_to_the_nanosecond(tmp_path_factory, trips)
     assert np.rint(record.values_ms * 1e6).astype(int).tolist() == [t for t, _ in trips if t is not None]
     assert record.lost == sum(outcome == "lost" for _, outcome in trips)
     assert record.wrong == sum(outcome == "wrong" for _, outcome in trips)
+    made = Record.of("sort", [RoundTrip(index, *trip) for index, trip in enumerate(trips)])
+    assert (made.name, made.lost, made.wrong) == (record.name, record.lost, record.wrong)
+    assert made.values_ms.tolist() == pytest.approx(record.values_ms.tolist())
 
 
 def test_every_line_is_on_disk_before_the_next(tmp_path):

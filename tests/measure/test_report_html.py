@@ -97,6 +97,21 @@ def test_the_tables_hold_the_figures_beside_the_real_boards(tmp_path, board_reco
     assert "real board are of times modulo 1 s, ours of whole times" in html
 
 
+def test_what_the_board_never_ran_has_a_speedup_and_nothing_beside_it(tmp_path):
+    records = {
+        "all_software": {"mine": Record("mine", np.array([4.0]))},
+        "mixed": {"mine": Record("mine", np.array([2.0]))},
+        "other": {"sort": like_the_board("mixed", "sort")},
+    }
+    records["all_software"]["sort"] = like_the_board("all_software", "sort")
+    html = written(tmp_path / "r.html", (experiment_of(records), records))
+    rows = [re.findall(r"<td[^>]*>([^<]*)</td>", row) for row in re.findall(r"<tr>(.*?)</tr>", html)]
+    (mine,) = [row for row in rows if row[:2] == ["mine", "mixed"] and len(row) == 7]
+    assert mine[2:] == ["2.00", "-", "2.00", "-", "-"]
+    (other,) = [row for row in rows if row[:2] == ["sort", "other"] and len(row) == 7]
+    assert (other[2], other[3], other[5:]) == ("19.65", "-", ["-", "-"])
+
+
 def test_stages_come_in_the_order_of_the_clients(tmp_path, board_records):
     spans = {"mixed": {client: {"execution": 1.0} for client in reversed(board_records["mixed"])}}
     html = written(tmp_path / "r.html", (experiment_of(board_records, spans=spans), board_records))
@@ -142,7 +157,7 @@ def test_a_run_that_was_stopped_at_once_still_has_a_report(tmp_path):
 def test_the_report_replaces_an_older_one_or_leaves_it(tmp_path):
     records = {"mine": {"x": Record("x", np.array([1.0, 2.0]))}}
     run = (experiment_of(records), records)
-    path = tmp_path / "deep" / "report.html"
+    path = tmp_path / "as" / "deep" / "report.html"
     written(path, run)
     path.write_text("older")
     written(path, run)

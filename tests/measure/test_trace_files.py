@@ -38,7 +38,7 @@ def one_call(at_ns: int = 1_000_000) -> Trace:
 
 
 def test_in_the_trace_event_format_stages_stand_within_their_call(tmp_path: Path) -> None:
-    path = tmp_path / "new" / "trace.json"
+    path = tmp_path / "all" / "new" / "trace.json"
     check_trace_file(path)
     write_trace(path, "board7", one_call())
     events = json.loads(path.read_text())["traceEvents"]

@@ -63,11 +63,11 @@ MAIN += "    app.spin(Executor(app.board, 1, 1))\n"
 
 
 @pytest.fixture
-def app(tmp_path: Path) -> Application:
+def hosted(tmp_path: Path) -> HostedBoard:
     (tmp_path / "build.cfg").write_text(BUILD_CFG)
     (tmp_path / "main.py").write_text(MAIN)
     environment = VirtualEnvironment()
-    hosted = HostedBoard(
+    return HostedBoard(
         environment,
         SimulatedNetwork(environment).transport("b0"),
         read_profile("native"),
@@ -75,6 +75,10 @@ def app(tmp_path: Path) -> Application:
         ProjectMapping(name="m", executor="reconros", software_workers=1, hardware_workers=1, callbacks={}),
         BoardOptions(),
     )
+
+
+@pytest.fixture
+def app(hosted: HostedBoard) -> Application:
     return hosted._application
 
 
@@ -125,6 +129,15 @@ def test_a_node_of_streams_alone_is_in_the_graph(app: Application, end: str) -> 
     (token,) = (parse(token) for token in app.board.context.transport.tokens("@ros2_lv/**", 0))
     assert isinstance(token, NodeToken)
     assert (token.namespace, token.node) == ("/robot", "arm")
+
+
+def test_a_closed_board_takes_its_nodes_out_of_the_graph(hosted: HostedBoard) -> None:
+    transport = hosted.board.context.transport
+    hosted._application.writer("ros", "pub")
+    in_domain_0 = "@ros2_lv/0/**"
+    assert len(transport.tokens(in_domain_0, 0)) == 2  # the node and its publisher
+    hosted.close()
+    assert transport.tokens(in_domain_0, 0) == []
 
 
 def test_what_a_node_sends_for_its_parameters_and_actions_is_no_message_of_a_callback(

@@ -130,6 +130,16 @@ def test_a_fifo_has_room_for_the_smallest_message(tmp_path, end, words) -> None:
     assert words in str(refused.value)
 
 
+def test_a_fifo_of_the_size_of_its_messages_holds_them(tmp_path) -> None:
+    check_topics(
+        configuration(
+            tmp_path,
+            'p = rospub, node, sensor_msgs/Image, "/a", hw, 1000\n'
+            's = rossub, node, sensor_msgs/Image, "/a", hw, 2, drop, 1000\n',
+        )
+    )
+
+
 def test_a_gateway_lets_both_sides_have_the_same_name(tmp_path) -> None:
     check_topics(configuration(tmp_path, HW + SW + GATEWAY.format("g", "/a", "/a", "sensor_msgs/Image")))
 

@@ -176,13 +176,18 @@ def test_shipped_projects_are_read_without_a_warning(path: Path) -> None:
         ("TargetBoard = zcu104,revd", "zcu104"),
         ("TargetPart = xczu7ev-ffvc1156-2-e", "zcu104"),
         ("TargetBoard = zedboard,c\nTargetPart = xc7z020clg484-1", "native"),
+        ("TargetPart = xc7z020clg484-1", "native"),
         ("TargetOS = linux", "native"),
     ],
 )
-def test_the_profile_of_a_board(tmp_path: Path, general: str, profile: str) -> None:
+def test_the_profile_of_a_board_and_a_warning_where_none_is_like_it(
+    tmp_path: Path, general: str, profile: str, caplog: pytest.LogCaptureFixture
+) -> None:
     path = tmp_path / "build.cfg"
     path.write_text(f"[General]\nName = x\n{general}\n", encoding="utf-8")
     assert target_profile(read_build_cfg(path)) == profile
+    unlike = profile == "native" and general != "TargetOS = linux"
+    assert ("there is no profile for the board" in caplog.text) == unlike
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from reconros_zenoh.board.profile import read_profile
-from reconros_zenoh.errors import FileError
+from reconros_zenoh.errors import FileError, TransportError
 from reconros_zenoh.experiments.simulation import Simulation
 from reconros_zenoh.project.hosting import BoardOptions
 from reconros_zenoh.project.loader import load_project
@@ -168,6 +168,18 @@ def test_a_mistake_is_named_with_its_place(
     assert said in str(caught.value)
     assert "callbacks" not in set(sys.modules) - modules
     assert sys.path == places
+
+
+def test_what_is_no_mistake_of_the_project_keeps_its_words(tmp_path: Path) -> None:
+    new_project(tmp_path / "blink")
+    (tmp_path / "blink" / "main.py").write_text(
+        "from reconros_zenoh.errors import TransportError\n"
+        "def main(app):\n"
+        "    raise TransportError('no router')\n",
+        encoding="utf-8",
+    )
+    with pytest.raises(TransportError, match=r"^no router$"):
+        start(tmp_path / "blink")
 
 
 def test_a_second_spin_beside_a_gateway(tmp_path: Path) -> None:
