@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from reconros_zenoh.clock.virtual import VirtualEnvironment
     from reconros_zenoh.rmw.node import Context
-    from reconros_zenoh.ros.types import TypeRegistry
+    from reconros_zenoh.ros.type_registry import TypeRegistry
 
 _SECOND_NS = 1_000_000_000
 _ON_THE_WAY_NS = 2 * _SECOND_NS

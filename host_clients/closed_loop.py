@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from host_clients.exchange import Exchange
     from reconros_zenoh.clock.virtual import VirtualEnvironment
     from reconros_zenoh.rmw.node import Node
-    from reconros_zenoh.ros.types import TypeRegistry
+    from reconros_zenoh.ros.type_registry import TypeRegistry
 
 
 class ClosedLoop:

@@ -11,7 +11,7 @@ from host_clients.suite import exchange
 from reconros_zenoh.clock.process import begin_process
 from reconros_zenoh.errors import TransportError
 from reconros_zenoh.rmw.node import Context
-from reconros_zenoh.ros.types import TypeRegistry
+from reconros_zenoh.ros.type_registry import TypeRegistry
 from reconros_zenoh.transport.zenoh import ZenohTransport
 
 if TYPE_CHECKING:

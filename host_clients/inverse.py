@@ -11,7 +11,7 @@ from reconros_zenoh.applications.roundtrip.kernels.inverse import inverse_kinema
 if TYPE_CHECKING:
     from numpy.random import Generator
 
-    from reconros_zenoh.ros.types import TypeRegistry
+    from reconros_zenoh.ros.type_registry import TypeRegistry
 
 
 class InverseExchange(TopicExchange):

@@ -12,7 +12,7 @@ from reconros_zenoh.ros.image import image_message
 if TYPE_CHECKING:
     from numpy.random import Generator
 
-    from reconros_zenoh.ros.types import TypeRegistry
+    from reconros_zenoh.ros.type_registry import TypeRegistry
 
 
 class MnistExchange(TopicExchange):

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from reconros_zenoh.clock.virtual import VirtualEnvironment
     from reconros_zenoh.rmw.node import Context
     from reconros_zenoh.rmw.received import Received
-    from reconros_zenoh.ros.types import TypeRegistry
+    from reconros_zenoh.ros.type_registry import TypeRegistry
 
 RATE_HZ = 10.0
 _SECOND_NS = 1_000_000_000

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from reconros_zenoh.clock.virtual import VirtualEnvironment
     from reconros_zenoh.rmw.node import Context
     from reconros_zenoh.rmw.received import Received
-    from reconros_zenoh.ros.types import TypeRegistry
+    from reconros_zenoh.ros.type_registry import TypeRegistry
 
 _MOST_DIGITS = 12
 _MOST_LEFT_OUT = 100_000  # hours of pictures; each is one line in the record

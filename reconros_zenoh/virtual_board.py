@@ -23,7 +23,7 @@ from reconros_zenoh.project.loader import load_project
 from reconros_zenoh.rmw.node import Context
 from reconros_zenoh.ros.graph import EndpointKind, EndpointToken, parse, tokens_expression
 from reconros_zenoh.ros.names import resolve, type_name_of
-from reconros_zenoh.ros.types import TypeRegistry
+from reconros_zenoh.ros.type_registry import TypeRegistry
 from reconros_zenoh.transport.simulated import SimulatedNetwork
 
 if TYPE_CHECKING:

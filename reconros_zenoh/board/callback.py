@@ -15,7 +15,7 @@ from reconros_zenoh.board.host import measured
 from reconros_zenoh.board.noted_calls import noted
 from reconros_zenoh.board.timing import Native, cycles_ns
 from reconros_zenoh.errors import PageFaultError
-from reconros_zenoh.ros.c_layout import is_number, number
+from reconros_zenoh.ros.forms import is_number, number
 from reconros_zenoh.ros.message_arrays import arrays_of, lies_in
 
 if TYPE_CHECKING:

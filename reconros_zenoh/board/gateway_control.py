@@ -16,7 +16,7 @@ from reconros_zenoh.ros.qos import QosProfile
 
 if TYPE_CHECKING:
     from reconros_zenoh.board.board import Board
-    from reconros_zenoh.ros.types import TypeRegistry
+    from reconros_zenoh.ros.type_registry import TypeRegistry
     from reconros_zenoh.transport.base import Request, Transport
 
 _LOOK_NS = 1_000_000_000

@@ -10,7 +10,7 @@ from reconros_zenoh.errors import UsageError
 from reconros_zenoh.experiments.simulation import Simulation
 from reconros_zenoh.measure.record import Record, RecordWriter
 from reconros_zenoh.measure.statistics import summarise
-from reconros_zenoh.ros.types import TypeRegistry
+from reconros_zenoh.ros.type_registry import TypeRegistry
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence

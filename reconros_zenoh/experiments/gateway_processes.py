@@ -30,7 +30,7 @@ from reconros_zenoh.project.mapping_file import CallbackMapping
 from reconros_zenoh.rmw.node import Context
 from reconros_zenoh.ros.image import image_message
 from reconros_zenoh.ros.stamp import set_stamp, stamp_ns
-from reconros_zenoh.ros.types import TypeRegistry
+from reconros_zenoh.ros.type_registry import TypeRegistry
 from reconros_zenoh.transport.zenoh import ZenohTransport
 
 if TYPE_CHECKING:

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from reconros_zenoh.measure.record import RoundTrip
     from reconros_zenoh.project.loader import Project
     from reconros_zenoh.project.mapping_file import ProjectMapping
-    from reconros_zenoh.ros.types import TypeRegistry
+    from reconros_zenoh.ros.type_registry import TypeRegistry
 
 _SEEDS_KEPT = 4  # 15 MB each
 _exchange = lru_cache(maxsize=_SEEDS_KEPT * len(EXCHANGES))(exchange)

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     import simpy
 
     from reconros_zenoh.rmw.publisher import Publisher
-    from reconros_zenoh.ros.types import TypeRegistry
+    from reconros_zenoh.ros.type_registry import TypeRegistry
     from reconros_zenoh.transport.base import Parts
 
     Schedule: TypeAlias = Generator[tuple[int, str, Parts], None, None]

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from reconros_zenoh.project.resource_groups import Resource
     from reconros_zenoh.rmw.node import Node
     from reconros_zenoh.ros.qos import QosProfile
-    from reconros_zenoh.ros.types import TypeRegistry
+    from reconros_zenoh.ros.type_registry import TypeRegistry
 
 
 T = TypeVar("T")

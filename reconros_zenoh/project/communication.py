@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from reconros_zenoh.project.build_cfg import BuildConfiguration
     from reconros_zenoh.project.mapping_file import CallbackMapping
     from reconros_zenoh.project.resource_groups import Resource
-    from reconros_zenoh.ros.types import TypeRegistry
+    from reconros_zenoh.ros.type_registry import TypeRegistry
 
 T = TypeVar("T")
 

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from reconros_zenoh.project.application import Application
     from reconros_zenoh.project.build_cfg import BuildConfiguration
     from reconros_zenoh.project.interfaces import Interfaces
-    from reconros_zenoh.ros.types import TypeRegistry
+    from reconros_zenoh.ros.type_registry import TypeRegistry
 
 _log = logging.getLogger(__name__)
 

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from reconros_zenoh.rmw.ends import NodeEnds
     from reconros_zenoh.rmw.received import Received
-    from reconros_zenoh.ros.types import TypeRegistry
+    from reconros_zenoh.ros.type_registry import TypeRegistry
 
 _EVENTS = QosProfile(depth=1000)
 """rmw_qos_profile_parameter_events: reliable, volatile, keep the last 1000."""

@@ -9,13 +9,12 @@ import numpy as np
 from rosbags.interfaces import Nodetype
 
 from reconros_zenoh.errors import UsageError
+from reconros_zenoh.ros.forms import is_string, number
 
 if TYPE_CHECKING:
     from rosbags.interfaces.typing import FieldDesc
 
     from reconros_zenoh.ros.types import MessageType
-
-_NUMBERS = {"char": np.dtype("u1"), "byte": np.dtype("u1"), "octet": np.dtype("u1")}
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,22 +97,6 @@ class CLayout:
         if form[0] == Nodetype.SEQUENCE or is_string(form):
             return None, ("data", "size", "capacity")
         return None, ()
-
-
-def number(form: FieldDesc) -> np.dtype[np.generic]:
-    """Return the dtype of a number in memory, little endian."""
-    name = str(form[1][0])
-    return _NUMBERS.get(name) or np.dtype(name).newbyteorder("<")
-
-
-def is_number(form: FieldDesc) -> bool:
-    """Tell whether a field of this form is one number."""
-    return form[0] == Nodetype.BASE and not is_string(form)
-
-
-def is_string(form: FieldDesc) -> bool:
-    """Tell whether a field of this form is one string."""
-    return bool(form[0] == Nodetype.BASE and form[1][0] == "string")
 
 
 def _no_field(message_type: MessageType, path: str, known: object) -> UsageError:

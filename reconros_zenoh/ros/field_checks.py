@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from rosbags.interfaces import Nodetype
 
-from reconros_zenoh.ros.c_layout import is_number, number
+from reconros_zenoh.ros.forms import is_number, number
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

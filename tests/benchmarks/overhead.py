@@ -29,7 +29,7 @@ from table import arguments, free_port, print_result
 from reconros_zenoh.clock.process import tune_memory, tune_process
 from reconros_zenoh.rmw.node import Context
 from reconros_zenoh.ros.image import image_message
-from reconros_zenoh.ros.types import TypeRegistry
+from reconros_zenoh.ros.type_registry import TypeRegistry
 from reconros_zenoh.transport.zenoh import ZenohRouter, ZenohTransport
 
 if TYPE_CHECKING:

@@ -12,7 +12,7 @@ from reconros_zenoh.board.spans import Timeline
 from reconros_zenoh.clock.activity import Activity
 from reconros_zenoh.clock.virtual import VirtualEnvironment
 from reconros_zenoh.rmw.node import Context
-from reconros_zenoh.ros.types import TypeRegistry
+from reconros_zenoh.ros.type_registry import TypeRegistry
 from reconros_zenoh.transport.simulated import SimulatedNetwork
 
 if TYPE_CHECKING:

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from small_board import Steps
 
     from reconros_zenoh.project.loader import Project
-    from reconros_zenoh.ros.types import TypeRegistry
+    from reconros_zenoh.ros.type_registry import TypeRegistry
 
 MAPPINGS = ("all_software", "mixed", "all_hardware")
 PERIOD_NS = 250_000_000

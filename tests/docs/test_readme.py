@@ -22,7 +22,7 @@ from rosbags.rosbag2 import Writer
 
 from reconros_zenoh.applications.roundtrip.kernels.mnist import MODEL
 from reconros_zenoh.experiments.roundtrip import application_folder
-from reconros_zenoh.ros.types import TypeRegistry
+from reconros_zenoh.ros.type_registry import TypeRegistry
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

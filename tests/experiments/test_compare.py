@@ -15,7 +15,7 @@ from reconros_zenoh.errors import FileError, UsageError
 from reconros_zenoh.experiments.roundtrip import application_folder
 from reconros_zenoh.measure.record import read_record
 from reconros_zenoh.project.template import new_project
-from reconros_zenoh.ros.types import TypeRegistry
+from reconros_zenoh.ros.type_registry import TypeRegistry
 from reconros_zenoh.ros.zero_message import message_of
 
 if TYPE_CHECKING:

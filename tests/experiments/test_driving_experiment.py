@@ -40,7 +40,7 @@ from reconros_zenoh.measure.record import find_records, read_record, short_names
 from reconros_zenoh.project.hosting import BoardOptions
 from reconros_zenoh.project.loader import load_project, read_project
 from reconros_zenoh.ros.image import image_message
-from reconros_zenoh.ros.types import TypeRegistry
+from reconros_zenoh.ros.type_registry import TypeRegistry
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -11,7 +11,7 @@ from reconros_zenoh.applications.driving.world import RADIUS
 from reconros_zenoh.clock.virtual import VirtualEnvironment
 from reconros_zenoh.measure.record import RoundTrip
 from reconros_zenoh.rmw.node import Context
-from reconros_zenoh.ros.types import TypeRegistry
+from reconros_zenoh.ros.type_registry import TypeRegistry
 from reconros_zenoh.transport.simulated import SimulatedNetwork
 
 MS = 1_000_000

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from host_clients.scope import Scope
 from reconros_zenoh.clock.virtual import VirtualEnvironment
 from reconros_zenoh.rmw.node import Context
-from reconros_zenoh.ros.types import TypeRegistry
+from reconros_zenoh.ros.type_registry import TypeRegistry
 from reconros_zenoh.transport.simulated import SimulatedNetwork
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ from reconros_zenoh.errors import UsageError
 from reconros_zenoh.mapping.graph import ComputationGraph, Side, Topic
 from reconros_zenoh.mapping.live_graph import read_live_graph
 from reconros_zenoh.rmw.node import Context
-from reconros_zenoh.ros.types import TypeRegistry
+from reconros_zenoh.ros.type_registry import TypeRegistry
 from reconros_zenoh.transport.simulated import SimulatedNetwork
 
 HW, SW = Side.HARDWARE, Side.SOFTWARE

@@ -8,7 +8,7 @@ from reconros_zenoh.errors import FileError
 from reconros_zenoh.project.build_cfg import read_build_cfg
 from reconros_zenoh.project.communication import check_fifos, check_places, check_topics
 from reconros_zenoh.project.mapping_file import CallbackMapping
-from reconros_zenoh.ros.types import TypeRegistry
+from reconros_zenoh.ros.type_registry import TypeRegistry
 
 HEAD = """[HwSlot@slot(0:1)]
 Id = 0

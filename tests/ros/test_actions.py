@@ -8,7 +8,7 @@ from ros2_pyterfaces.core import all_srvs, description
 
 from reconros_zenoh.errors import FileError, UsageError
 from reconros_zenoh.ros.standard import standard_interfaces
-from reconros_zenoh.ros.types import TypeRegistry
+from reconros_zenoh.ros.type_registry import TypeRegistry
 
 FIBONACCI = "int32 order\n---\nint32[] sequence\n---\nint32[] partial_sequence\n"
 

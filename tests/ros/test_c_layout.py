@@ -12,8 +12,9 @@ from hypothesis import strategies as st
 from rosbags.interfaces import Nodetype
 
 from reconros_zenoh.errors import UsageError
-from reconros_zenoh.ros.c_layout import CLayout, is_number, number
-from reconros_zenoh.ros.types import TypeRegistry
+from reconros_zenoh.ros.c_layout import CLayout
+from reconros_zenoh.ros.forms import is_number, number
+from reconros_zenoh.ros.type_registry import TypeRegistry
 
 if TYPE_CHECKING:
     from rosbags.interfaces.typing import FieldDesc

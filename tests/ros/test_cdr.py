@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tracemalloc
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from unittest import mock
 
 import numpy as np
@@ -14,8 +14,11 @@ from rosbags.interfaces import Nodetype
 
 from reconros_zenoh.errors import BadMessageError, UsageError
 from reconros_zenoh.ros import types
-from reconros_zenoh.ros.types import MessageType, TypeRegistry
+from reconros_zenoh.ros.type_registry import TypeRegistry
 from reconros_zenoh.ros.zero_message import zero_message
+
+if TYPE_CHECKING:
+    from reconros_zenoh.ros.types import MessageType
 
 REGISTRY = TypeRegistry()
 REGISTRY.add_service("sorter_msgs/srv/Sort", "uint32[] unsorted\n---\nuint32[] sorted\n")

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from reconros_zenoh.ros.message_arrays import arrays_of, is_unchanging, lies_in, snapshot
-from reconros_zenoh.ros.types import TypeRegistry
+from reconros_zenoh.ros.type_registry import TypeRegistry
 
 REGISTRY = TypeRegistry()
 WORDS = REGISTRY.message("std_msgs/msg/UInt32MultiArray").cls

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from reconros_zenoh.errors import UsageError
-from reconros_zenoh.ros.types import TypeRegistry
+from reconros_zenoh.ros.type_registry import TypeRegistry
 from reconros_zenoh.ros.zero_message import message_of
 
 types = TypeRegistry()

@@ -25,7 +25,7 @@ from ros2_pyterfaces.cyclone.std_srvs import srv as std_srvs
 from reconros_zenoh.ros.graph import EndpointKind, EndpointToken, NodeToken, gid, parse
 from reconros_zenoh.ros.names import data_key, dds_type_name, resolve
 from reconros_zenoh.ros.qos import Durability, History, Liveliness, QosProfile, Reliability
-from reconros_zenoh.ros.types import TypeRegistry
+from reconros_zenoh.ros.type_registry import TypeRegistry
 
 REGISTRY = TypeRegistry()
 SESSION: Any = object()  # not looked at, because every id is given

@@ -7,7 +7,7 @@ import pytest
 
 from reconros_zenoh.ros.image import image_message
 from reconros_zenoh.ros.stamp import set_stamp, stamp_ns
-from reconros_zenoh.ros.types import TypeRegistry
+from reconros_zenoh.ros.type_registry import TypeRegistry
 
 TYPES = TypeRegistry()
 

@@ -15,7 +15,7 @@ from reconros_zenoh.transport.zenoh import ZenohTransport
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from reconros_zenoh.ros.types import TypeRegistry
+    from reconros_zenoh.ros.type_registry import TypeRegistry
 
 
 class Network(NamedTuple):

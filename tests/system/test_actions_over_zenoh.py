@@ -27,7 +27,7 @@ from reconros_zenoh.transport.zenoh import ZenohRouter, ZenohTransport
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from reconros_zenoh.ros.types import TypeRegistry
+    from reconros_zenoh.ros.type_registry import TypeRegistry
     from reconros_zenoh.transport.base import Transport
 
 LIMIT_S = 30

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     from conftest import Network
 
-    from reconros_zenoh.ros.types import TypeRegistry
+    from reconros_zenoh.ros.type_registry import TypeRegistry
     from reconros_zenoh.transport.base import Reply
 
 LIMIT_NS = LIMIT_S * 10**9

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from reconros_zenoh.rmw.received import Received
-    from reconros_zenoh.ros.types import TypeRegistry
+    from reconros_zenoh.ros.type_registry import TypeRegistry
 
 SEED = 3
 SWALLOWED, WRONG, LATE = 1, 3, 5

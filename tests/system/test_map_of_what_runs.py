@@ -12,7 +12,7 @@ from reconros_zenoh.rmw.node import Context
 if TYPE_CHECKING:
     from conftest import Network
 
-    from reconros_zenoh.ros.types import TypeRegistry
+    from reconros_zenoh.ros.type_registry import TypeRegistry
 
 
 def test_the_graph_of_a_board_and_its_clients(network: Network, types: TypeRegistry) -> None:

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from conftest import Network
 
-    from reconros_zenoh.ros.types import TypeRegistry
+    from reconros_zenoh.ros.type_registry import TypeRegistry
     from reconros_zenoh.transport.base import Sample
 
 each_signal = pytest.mark.parametrize("number", ENDING, ids=lambda number: number.name)

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from reconros_zenoh.board.software import SoftwareContext
     from reconros_zenoh.board.writers import MessageWriter
     from reconros_zenoh.clock.activity import Awaitable
-    from reconros_zenoh.ros.types import TypeRegistry
+    from reconros_zenoh.ros.type_registry import TypeRegistry
 
     Picture = NDArray[np.uint8]
     Steps = Generator[Awaitable, object, None]

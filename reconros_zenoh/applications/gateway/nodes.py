@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from reconros_zenoh.clock.activity import Awaitable
     from reconros_zenoh.clock.virtual import VirtualEnvironment
     from reconros_zenoh.project.application import Application
-    from reconros_zenoh.ros.types import TypeRegistry
+    from reconros_zenoh.ros.type_registry import TypeRegistry
 
     OnReceived: TypeAlias = Callable[[str, int, int], None]
     """Gets a subscriber's name, the number of an image that it has copied, and the transmission time [ns]."""

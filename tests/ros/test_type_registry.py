@@ -5,11 +5,15 @@ from __future__ import annotations
 import dataclasses
 import subprocess
 import sys
+from typing import TYPE_CHECKING
 
 import pytest
 
 from reconros_zenoh.errors import FileError, UsageError
-from reconros_zenoh.ros.types import MessageType, TypeRegistry
+from reconros_zenoh.ros.type_registry import TypeRegistry
+
+if TYPE_CHECKING:
+    from reconros_zenoh.ros.types import MessageType
 
 SORT = "# What the sorter does\nuint32[] unsorted\n---\nuint32[] sorted\n"
 
@@ -27,8 +31,8 @@ def field_names(kind: MessageType) -> list[str]:
 def test_importing_the_types_loads_neither_zenoh_nor_the_types_of_jazzy() -> None:
     source = (
         "import sys\n"
-        "from reconros_zenoh.ros import attachment, graph, names, qos, types\n"
-        "types.TypeRegistry()\n"
+        "from reconros_zenoh.ros import attachment, graph, names, qos, type_registry\n"
+        "type_registry.TypeRegistry()\n"
         "print([m for m in sys.modules if m.split('.')[0] == 'zenoh' or m.endswith('ros2_jazzy')])"
     )
     done = subprocess.run([sys.executable, "-c", source], capture_output=True, text=True, check=True)
