@@ -13,6 +13,7 @@ from reconros_zenoh.board.gateway import Gateway
 from reconros_zenoh.board.hmt import HardwareTopic, hmt_key
 from reconros_zenoh.board.host import Host
 from reconros_zenoh.board.local_topics import LocalTopics, LocalTopicWriter
+from reconros_zenoh.board.log import BoardLog
 from reconros_zenoh.board.memif import Memif
 from reconros_zenoh.board.osif import Osif
 from reconros_zenoh.board.slots import Slot
@@ -85,6 +86,7 @@ class Board:
         self.context = context
         self.profile = profile
         self.name = name
+        self.log = BoardLog(environment, self.started_ns, name)
         self.trace = Trace(environment) if traced else None
         self.cpu = Cpu(environment, int(model.cores.count.value) if model else 1)
         self.memif = Memif(environment, model.memif.bandwidth.bytes_per_ns if model else None)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -22,7 +21,6 @@ if TYPE_CHECKING:
     from reconros_zenoh.ros.types import ServiceType
     from reconros_zenoh.transport.base import Parts
 
-_log = logging.getLogger(__name__)
 _ANSWER_NS = 10_000_000_000
 _UNSENT = "newer calls pushed it out before it was sent, or it cannot be sent"
 
@@ -102,7 +100,7 @@ class ClientSource(Reader):
         self.unanswered += 1
         if self._is_answered:
             self._is_answered = False
-            _log.warning(
+            self._board.log.warning(
                 "a call of service %s has no answer: %s; until one has, this is not reported again",
                 self._client.name,
                 reason,

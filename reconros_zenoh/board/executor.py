@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import math
 from collections import Counter, defaultdict
 from collections.abc import Iterable
@@ -36,8 +35,6 @@ if TYPE_CHECKING:
     from reconros_zenoh.board.timing import ExecutionTime, Timing
     from reconros_zenoh.board.workers import Worker
     from reconros_zenoh.executor.callbacks import Dispatch
-
-_log = logging.getLogger(__name__)
 
 ExecutorKind = Literal["reconros", "standard"]
 
@@ -232,7 +229,7 @@ class Executor:
         if self._ways_to_fail[name].is_new(error):
             stages = event.timeline.stages_ns.items()
             spans = ", ".join(f"{stage} {ns / 1e6:g} ms" for stage, ns in stages if ns)
-            _log.error(
+            self.board.log.error(
                 "callback %s failed after %s; a failure of this kind is not reported again",
                 name,
                 spans or "0 ms",

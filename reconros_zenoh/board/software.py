@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 from dataclasses import dataclass
 from functools import partial
 from inspect import isasyncgenfunction, iscoroutinefunction, isgeneratorfunction
@@ -18,6 +17,7 @@ if TYPE_CHECKING:
     from reconros_zenoh.board.board import Board
     from reconros_zenoh.board.clients import ClientSource
     from reconros_zenoh.board.host import Limit
+    from reconros_zenoh.board.log import BoardLog
     from reconros_zenoh.board.os_resources import Condition, Mailbox, Mutex, Semaphore
     from reconros_zenoh.board.spans import Timeline
     from reconros_zenoh.board.timing import ExecutionTime
@@ -69,9 +69,9 @@ class SoftwareContext:
         self.sends: list[Callable[[Timeline], object]] = []
 
     @property
-    def log(self) -> logging.Logger:
-        """The callback's logger; what it says stands in the board's log."""
-        return logging.getLogger(f"{__name__}.{self._callback}")
+    def log(self) -> BoardLog:
+        """The callback's logger."""
+        return self._board.log.of(self._callback)
 
     @property
     def now_ns(self) -> int:

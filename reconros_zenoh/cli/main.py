@@ -130,7 +130,8 @@ class Formatter(logging.Formatter):
 
     def formatMessage(self, record: logging.LogRecord) -> str:  # noqa: N802 # as in the base
         """Return the line of a record, cut where it is too long."""
-        text = super().formatMessage(record)
+        when = f" at {record.elapsed_ms:.3f} ms" if hasattr(record, "elapsed_ms") else ""
+        text = f"{record.levelname} {record.name}{when}: {record.message}"
         if len(text) > _LONGEST_LINE:
             text = f"{text[: _LONGEST_LINE // 2]} ... {text[-_LONGEST_LINE // 2 :]}"
         return printable(text, line_ends=False)
@@ -138,7 +139,7 @@ class Formatter(logging.Formatter):
 
 def _log_to_stderr() -> None:
     handler = logging.StreamHandler()
-    handler.setFormatter(Formatter("%(levelname)s %(name)s: %(message)s"))
+    handler.setFormatter(Formatter())
     logging.basicConfig(level=logging.INFO, handlers=[handler])
 
 

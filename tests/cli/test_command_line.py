@@ -124,10 +124,16 @@ def test_an_error_does_not_tell_the_terminal_what_to_do() -> None:
 def test_a_log_line_is_one_line_without_control_characters() -> None:
     text = "a\nWARNING b \x1b[2J" + 3000 * "x"
     record = logging.LogRecord("a.b", logging.WARNING, "", 1, "refused %s", (text,), None)
-    line = Formatter("%(levelname)s %(message)s").format(record)
-    assert line.startswith(r"WARNING refused a\nWARNING b \x1b[2Jxxx")
+    line = Formatter().format(record)
+    assert line.startswith(r"WARNING a.b: refused a\nWARNING b \x1b[2Jxxx")
     assert line.isprintable()
     assert 2000 < len(line) < 2050
+
+
+def test_a_log_line_of_a_board_says_when() -> None:
+    record = logging.LogRecord("reconros_zenoh.board0.filter", logging.INFO, "", 1, "no lane", (), None)
+    record.elapsed_ms = 1234.5678
+    assert Formatter().format(record) == "INFO reconros_zenoh.board0.filter at 1234.568 ms: no lane"
 
 
 @pytest.mark.parametrize("words", ["--help", "hist {record}", "hist {record} --json", "check nowhere --json"])
