@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import fcntl
 import json
 import os
 import platform
@@ -14,6 +13,7 @@ from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 from reconros_zenoh.errors import UsageError
+from reconros_zenoh.measure.file_lock import lock
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -61,15 +61,10 @@ def own_folder(folder: Path) -> Iterator[None]:
         folder.mkdir(parents=True, exist_ok=True)
         descriptor = os.open(folder, os.O_RDONLY)
     try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        os.close(descriptor)
-        raise UsageError(
-            f"another experiment is writing to {folder}. Wait for its end, or choose another --out."
-        ) from None
-    except OSError:
-        pass  # some network file systems lock no folders
-    try:
+        if not lock(descriptor):
+            raise UsageError(
+                f"another experiment is writing to {folder}. Wait for its end, or choose another --out."
+            )
         yield
     finally:
         os.close(descriptor)

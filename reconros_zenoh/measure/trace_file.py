@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 from reconros_zenoh.errors import UsageError
+from reconros_zenoh.measure.file_lock import lock
 from reconros_zenoh.measure.plots import write_figure
 from reconros_zenoh.measure.trace_plots import trace_figure
 
@@ -29,15 +30,19 @@ def traced_to(path: Path | None, board: Board) -> Iterator[None]:
     if path is None or board.trace is None:
         yield
         return
-    check_trace_file(path)
-    try:
-        yield
-    finally:
-        write_trace(path, board.name, board.trace)
+    with own_trace_file(path):
+        try:
+            yield
+        finally:
+            write_trace(path, board.name, board.trace)
 
 
-def check_trace_file(path: Path) -> None:
-    """Raise UsageError unless a trace can be written there; makes its folder."""
+@contextmanager
+def own_trace_file(path: Path) -> Iterator[None]:
+    """Run the block with a file to which no other board writes its trace.
+
+    Makes its folder; raises UsageError when the file cannot be written, or while another board has it.
+    """
     if path.suffix.lower() not in {".json", *(f".{each}" for each in _DRAWINGS)}:
         raise UsageError(
             f"{path}: a trace is written as .json, for ui.perfetto.dev, or drawn as .png or .svg. "
@@ -45,9 +50,13 @@ def check_trace_file(path: Path) -> None:
         )
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.open("ab").close()
+        file = path.open("ab")
     except OSError as error:
         raise _unwritable(path, error) from None
+    with file:
+        if not lock(file.fileno()):
+            raise UsageError(f"another board writes its trace to {path}. Give each a --trace of its own.")
+        yield
 
 
 def write_trace(path: Path, board: str, trace: Trace) -> None:

@@ -11,7 +11,7 @@ from PIL import Image
 from reconros_zenoh.board.trace import Trace
 from reconros_zenoh.clock.virtual import VirtualEnvironment
 from reconros_zenoh.errors import UsageError
-from reconros_zenoh.measure.trace_file import check_trace_file, write_trace
+from reconros_zenoh.measure.trace_file import own_trace_file, write_trace
 from reconros_zenoh.measure.trace_plots import trace_figure
 
 if TYPE_CHECKING:
@@ -39,8 +39,8 @@ def one_call(at_ns: int = 1_000_000) -> Trace:
 
 def test_in_the_trace_event_format_stages_stand_within_their_call(tmp_path: Path) -> None:
     path = tmp_path / "all" / "new" / "trace.json"
-    check_trace_file(path)
-    write_trace(path, "board7", one_call())
+    with own_trace_file(path):
+        write_trace(path, "board7", one_call())
     events = json.loads(path.read_text())["traceEvents"]
     names = {event["tid"]: event["args"]["name"] for event in events if event["name"] == "thread_name"}
     assert names == {0: "RS0", 1: "ICAP", 2: "DDS stack"}
@@ -86,11 +86,29 @@ def test_a_trace_is_drawn_to_a_file_also_where_nothing_happened(tmp_path: Path, 
 
 
 def test_a_file_of_another_kind_or_in_no_folder_is_refused_at_once(tmp_path: Path) -> None:
-    with pytest.raises(UsageError, match=r"trace\.txt: a trace is written as \.json"):
-        check_trace_file(tmp_path / "trace.txt")
+    with (
+        pytest.raises(UsageError, match=r"trace\.txt: a trace is written as \.json"),
+        own_trace_file(tmp_path / "trace.txt"),
+    ):
+        pass
     (tmp_path / "file").touch()
-    with pytest.raises(UsageError, match=r"cannot be written .* another file for --trace"):
-        check_trace_file(tmp_path / "file" / "trace.json")
+    with (
+        pytest.raises(UsageError, match=r"cannot be written .* another file for --trace"),
+        own_trace_file(tmp_path / "file" / "trace.json"),
+    ):
+        pass
     (tmp_path / "folder.json").mkdir()
-    with pytest.raises(UsageError, match=r"cannot be written"):
-        check_trace_file(tmp_path / "folder.json")
+    with pytest.raises(UsageError, match=r"cannot be written"), own_trace_file(tmp_path / "folder.json"):
+        pass
+
+
+def test_two_boards_do_not_write_to_one_file(tmp_path: Path) -> None:
+    path = tmp_path / "trace.json"
+    with (
+        own_trace_file(path),
+        pytest.raises(UsageError, match=r"another board writes its trace to .*trace\.json\. Give each"),
+        own_trace_file(path),
+    ):
+        pass
+    with own_trace_file(path):  # afterwards it is free again
+        pass
