@@ -35,8 +35,8 @@ def apply_mapping(
 
     The ends in hardware of topics in T_HW and T_GW become hardware-mapped, and each topic in T_GW gets a
     gateway, in a slot that no thread and no other gateway names. Every other byte of the file stays, comments
-    and encoding included, and what is hardware-mapped already. The file is replaced as a whole or not at all. FileError
-    names the line of what cannot be changed.
+    and encoding included, and what is hardware-mapped already. The file is replaced as a whole or not at all.
+    FileError names the line of what cannot be changed.
     """
     path = configuration.path
     ends = [
