@@ -272,17 +272,19 @@ class HmtSource(Source):
     def take(self) -> Event:
         """Remove the oldest message and return it, as it lies in the slot."""
         streamed = self._fifo.take()
-        streamed.timeline.mark("hmt")
+        streamed.timeline.mark("queue")
         return Event(streamed.message, streamed.timeline, message_type=self.message_type, in_slot=True)
 
     def _arrived(self) -> None:
+        streamed = self._fifo.messages[-1]
+        streamed.timeline.mark("hmt")
         try:
             if self._check is not None:
-                self._check(self._fifo.messages[-1].message)
+                self._check(streamed.message)
         except BadMessageError as error:
-            bad = self._fifo.messages.pop()
+            self._fifo.messages.pop()
             self._fifo.release()
-            self._board.context.rejections.add(self._topic.key, bad.sender, error)
+            self._board.context.rejections.add(self._topic.key, streamed.sender, error)
             return
         self._on_ready()
 

@@ -208,7 +208,7 @@ class LocalTopicWriter(TopicWriter):
         """Return when the delegate has published; its call is part of what a publication costs."""
         message, parts = self.encode(message)
         yield from self._publish(_Sent(message, parts, timeline.fork()), hardware=True)
-        timeline.mark("osif")
+        timeline.mark("dds")
 
     def _publish(self, sent: _Sent, *, hardware: bool) -> Generator[Awaitable, object, None]:
         received = Received(sent.message, sum(map(len, sent.parts)), 0, publisher=self.gid)

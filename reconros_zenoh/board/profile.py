@@ -190,7 +190,7 @@ class Model(_Section):
     memif: MemifSection
     osif: OsifSection
     bitstreams: Annotated[tuple[BitstreamSection, ...], Field(min_length=1, strict=False)]
-    callbacks: dict[str, CallbackSection]
+    callbacks: dict[str, CallbackSection] = {}
     topics: TopicsSection | None = None
     gateway: GatewaySection | None = None
     hmt: HmtSection | None = None

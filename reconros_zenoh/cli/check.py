@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -14,11 +15,10 @@ from reconros_zenoh.cli.options import AsJson
 from reconros_zenoh.project.build_cfg import read_build_cfg
 from reconros_zenoh.project.communication import check_topics, check_types
 from reconros_zenoh.project.loader import read_project
-from reconros_zenoh.project.resources import slot_resources
+from reconros_zenoh.project.resources import resources_by_slot
 
 if TYPE_CHECKING:
     from reconros_zenoh.project.build_cfg import BuildConfiguration
-    from reconros_zenoh.project.slots import HwSlot
 
 _ENDPOINTS = {
     "topics": ("rossub", "rospub"),
@@ -75,7 +75,7 @@ def _as_json(configuration: BuildConfiguration) -> dict[str, Any]:
         "clocks": [
             {"name": clock.name, "source": clock.source, "hz": clock.hz} for clock in configuration.clocks
         ],
-        "slots": [_slot(slot) for slot in configuration.slots],
+        "slots": _slots(configuration),
         "threads": [
             {
                 "name": thread.name,
@@ -110,18 +110,18 @@ def _board(configuration: BuildConfiguration) -> str | None:
     return None if board is None else f"{board.board},{board.revision}".rstrip(",")
 
 
-def _slot(slot: HwSlot) -> dict[str, Any]:
-    resources = slot_resources(slot.regions)
-    return {
-        "id": slot.id,
-        "name": slot.name,
-        "clock": slot.clock,
-        "reconfigurable": slot.reconfigurable,
-        "lut": resources.lut,
-        "dsp": resources.dsp,
-        "bram36": resources.bram36,
-        "bram18": resources.bram18,
-    }
+def _slots(configuration: BuildConfiguration) -> list[dict[str, Any]]:
+    resources = resources_by_slot(configuration.slots)
+    return [
+        {
+            "id": slot.id,
+            "name": slot.name,
+            "clock": slot.clock,
+            "reconfigurable": slot.reconfigurable,
+            **asdict(resources[slot.id]),
+        }
+        for slot in configuration.slots
+    ]
 
 
 def _print(console: PlainConsole, configuration: BuildConfiguration) -> None:
@@ -142,13 +142,12 @@ def _print(console: PlainConsole, configuration: BuildConfiguration) -> None:
         ((clock.name, clock.source, clock.hz) for clock in configuration.clocks),
         title="clocks",
     )
-    slots = map(_slot, configuration.slots)
     print_rows(
         console,
         ("id", "name", "clock", "reconfigurable", "LUT", "DSP", "BRAM36", "BRAM18"),
         (
             ["yes" if value is True else "no" if value is False else value for value in slot.values()]
-            for slot in slots
+            for slot in _slots(configuration)
         ),
         title="slots",
     )

@@ -52,7 +52,7 @@ def callbacks(
     else:
         _show_callbacks(result)
     if result["interrupted"]:
-        raise interrupted(quiet=as_json)
+        raise interrupted(quiet=as_json, measured=bool(result["callbacks"]))
 
 
 def reconfiguration(
@@ -86,7 +86,7 @@ def reconfiguration(
         _print_regression(console, result)
         _print_what_if(console, result)
     if result["interrupted"]:
-        raise interrupted(quiet=as_json)
+        raise interrupted(quiet=as_json, measured=bool(result["slots"]))
 
 
 def _classified(path: Path) -> dict[str, float | int]:

@@ -20,7 +20,7 @@ from reconros_zenoh.experiments.interruption import until_interrupted
 from reconros_zenoh.experiments.roundtrip import application
 from reconros_zenoh.project.ini import Option
 from reconros_zenoh.project.regions import read_regions
-from reconros_zenoh.project.resources import SlotResources, slot_resources
+from reconros_zenoh.project.resources import SlotResources, resources_by_slot, slot_resources
 from reconros_zenoh.rmw.node import Context
 from reconros_zenoh.transport.simulated import SimulatedNetwork
 
@@ -105,13 +105,14 @@ def measure_reconfiguration(
     board = Board(environment, Context(network.transport("b0")), profile, project.slots)
     slots = {}
     with until_interrupted() as interruption, closing(board):
+        resources_of = resources_by_slot(project.configuration.slots)
         for declared in project.configuration.slots:
             slot = board.slots[declared.id]
             written = environment.event()
             Activity(_write(board, slot, writes, written))
             times_ms = environment.run(until=written)
             slots[str(slot.slot_id)] = _row(
-                slot, slot_resources(declared.regions), np.array(times_ms, dtype=np.float64), model
+                slot, resources_of[declared.id], np.array(times_ms, dtype=np.float64), model
             )
             on_slot()
     return {

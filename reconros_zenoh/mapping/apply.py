@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from reconros_zenoh.project.ini import Option
     from reconros_zenoh.project.mapping_file import ProjectMapping
 
+_UNREADABLE = re.compile("[\udc80-\udcff]")
 _WORD = re.compile(r'"[^"\n]*"|[^\s,"]+')
 
 
@@ -33,9 +34,9 @@ def apply_mapping(
     """Write the mapping of topics into the project file; return what was changed, nothing if all is there.
 
     The ends in hardware of topics in T_HW and T_GW become hardware-mapped, and each topic in T_GW gets a
-    gateway, in a slot that no thread and no other gateway names. Every other byte of the file stays, its
-    encoding, and what is hardware-mapped already. The file is replaced as a whole or not at all. FileError
-    names the line of what cannot be changed.
+    gateway, in a slot that no thread and no other gateway names. Every other byte of the file stays, comments
+    and encoding included, and what is hardware-mapped already. The file is replaced as a whole or not at all.
+    FileError names the line of what cannot be changed.
     """
     path = configuration.path
     ends = [
@@ -48,11 +49,7 @@ def apply_mapping(
     lines = list(StringIO(content.decode(encoding, "surrogateescape"), newline=""))  # line ends as they are
     changes = []
     for option, value in _switched(configuration, ends):
-        start, equals, _ = lines[option.line - 1].partition("=")
-        lines[option.line - 1] = f"{start}{equals} {value}{_line_end(lines[option.line - 1])}"
-        for number in option.value_lines:
-            if number != option.line:
-                lines[number - 1] = ""
+        _write_value(lines, option, value)
         changes.append(f"line {option.line}: {option.name} = {value}")
     for section in _gateways(configuration, ends, topics_of(mappings, TopicMapping.GATEWAY)):
         if not _line_end(lines[-1]):
@@ -62,6 +59,20 @@ def apply_mapping(
     if changes:
         _replace(path.resolve(), "".join(lines), encoding)
     return changes
+
+
+def _write_value(lines: list[str], option: Option, value: str) -> None:
+    """Write `value` in place of the option's, and nothing else: comments behind it stay.
+
+    A line in which nothing is left is taken out.
+    """
+    for number, text in zip(option.value_lines, option.value.split("\n"), strict=True):
+        line = lines[number - 1]
+        read = _UNREADABLE.sub("\ufffd", line)  # as the reader of sections has it
+        start = read.index(text, read.index(option.name) + len(option.name) if number == option.line else 0)
+        line = f"{line[:start]}{value}{line[start + len(text) :]}"
+        lines[number - 1] = line if line.strip() else ""
+        value = ""
 
 
 def _check_types(path: Path, ends: Iterable[TopicEnd]) -> None:

@@ -17,7 +17,7 @@ from reconros_zenoh.project.communication import check_fifos, check_places, chec
 from reconros_zenoh.project.interfaces import read_interfaces
 from reconros_zenoh.project.main_file import load_main, running_project
 from reconros_zenoh.project.mapping_file import ProjectMapping, built_for, read_mapping
-from reconros_zenoh.project.resources import slot_resources
+from reconros_zenoh.project.resources import resources_by_slot
 from reconros_zenoh.project.target import target_profile
 from reconros_zenoh.text_file import read_text_file
 
@@ -51,6 +51,7 @@ class ProjectFiles:
     def slots(self) -> tuple[SlotPlan, ...]:
         """The slots with the resources of their regions and their clocks."""
         clocks = {clock.name: clock.hz for clock in self.configuration.clocks}
+        resources_of = resources_by_slot(self.configuration.slots)
         return tuple(
             SlotPlan(
                 slot.id,
@@ -61,7 +62,7 @@ class ProjectFiles:
                 slot.reconfigurable,
             )
             for slot in self.configuration.slots
-            for resources in [slot_resources(slot.regions)]
+            for resources in [resources_of[slot.id]]
         )
 
     @property

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Collection, Iterable, Mapping
 
     from reconros_zenoh.project.regions import Region
+    from reconros_zenoh.project.slots import HwSlot
 
 _LUTS_PER_SLICE = 4
 # UltraScale+ slices hold twice as many LUTs (UG574). Site types that only this family has give it away.
@@ -37,10 +38,24 @@ def slot_resources(regions: Iterable[Region]) -> SlotResources:
     RAMB36 sites of their regions are 120 and 100, so the counts here are 120 / 240 and 100 / 200. Site types
     other than SLICE, DSP48, RAMB36 and RAMB18 are not counted.
     """
+    regions = tuple(regions)
+    return _count(regions, ultrascale=_is_ultrascale(regions))
+
+
+def resources_by_slot(slots: Collection[HwSlot]) -> Mapping[int, SlotResources]:
+    """Return the resources of the slots of one device by id; one of them gives the family of all away."""
+    ultrascale = any(_is_ultrascale(slot.regions) for slot in slots)
+    return {slot.id: _count(slot.regions, ultrascale=ultrascale) for slot in slots}
+
+
+def _is_ultrascale(regions: Iterable[Region]) -> bool:
+    return any(region.site.startswith(_ULTRASCALE_SITES) for region in regions)
+
+
+def _count(regions: Iterable[Region], *, ultrascale: bool) -> SlotResources:
     sites: Counter[str] = Counter()
     for region in regions:
         sites[region.site] += region.sites
-    ultrascale = any(site.startswith(_ULTRASCALE_SITES) for site in sites)
     return SlotResources(
         lut=sites["SLICE"] * (_LUTS_PER_ULTRASCALE_SLICE if ultrascale else _LUTS_PER_SLICE),
         dsp=sites["DSP48"] + sites["DSP48E2"],

@@ -124,6 +124,26 @@ def test_a_gateway_has_a_column_of_its_own_on_the_way(inwards: bool) -> None:
     assert columns["/bridge"].keys() >= {"dds", "gateway", "hmt"}
 
 
+def test_a_message_in_a_fifo_waits_in_the_queue_until_a_worker_takes_it() -> None:
+    board = chain_board(1)
+    executor, stream = Executor(board, 0, 1), board.hardware_topic("/stream", WORD)
+
+    def first(hardware: Any) -> Steps:
+        yield from hardware.publish(publisher, WORD.cls(data=0))
+        yield from hardware.compute(int)  # 7 us, from when the message is on its way
+
+    def second(hardware: Any) -> Steps:
+        yield from hardware.get_init_data()
+
+    publisher = HmtWriter(stream)
+    executor.add_hw_callback("first", [0], CallbackKind.TMR, TimerSource(board, 1_000_000), first)
+    executor.add_hw_callback("second", [0], SUB, HmtSource(board, stream, FifoPlan()), second)
+    executor.spin()
+    board.environment.run(until=1_500_000)
+    column = board.spans.mean_ms()["second"]
+    assert (column["hmt"], column["queue"]) == (0.00009, 0.00691)
+
+
 def test_what_is_read_here_and_elsewhere_counts_once_when_it_has_left() -> None:
     board = chain_board(0)
     node, executor = board.context.node("n"), Executor(board, 2, 0)

@@ -201,7 +201,7 @@ def test_a_kernel_between_two_streams_costs_no_memif() -> None:
     assert transferred_bytes(board) == 0
     # 100 ns on one stream, 1000 to load the slot, 100 on the other
     assert board.spans.mean_ms()["relay"] == pytest.approx(
-        {"hmt": 0.0001, "dispatch": 0, "reconfiguration": 0.001, "osif": 0}
+        {"hmt": 0.0001, "queue": 0, "dispatch": 0, "reconfiguration": 0.001, "osif": 0}
     )
     assert board.environment.now == 1200
 

@@ -129,6 +129,15 @@ def test_all_readers_get_one_copy_of_the_message_and_nothing_leaves_the_board() 
     assert not put
 
 
+def test_what_a_hardware_callback_publishes_keeps_it_in_the_stage_of_topics() -> None:
+    setup = Setup(1)
+    timeline = Timeline(setup.environment, setup.environment.now)
+    body = words.cls(layout=layout, data=np.zeros(U, np.uint8))
+    Activity(setup.writer.publish(body, setup.board.osif, timeline))
+    setup.environment.run()
+    assert timeline.stages_ns == {"dds": A + D}
+
+
 def test_an_array_that_nobody_can_change_is_handed_over_by_reference() -> None:
     setup = Setup(2)
     data = np.zeros(U, np.uint8)

@@ -98,6 +98,14 @@ def test_a_profile_of_ones_own(tmp_path: Path) -> None:
     assert read_profile(str(path)).model == read_profile("miniitx-zynq7100").model
 
 
+def test_a_profile_needs_no_times_of_callbacks(tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text(MINIITX.partition("[model.callbacks.")[0])
+    profile = read_profile(str(path))
+    assert profile.model is not None
+    assert profile.model.callbacks == {}
+
+
 def test_an_unknown_name_lists_those_there_are() -> None:
     with pytest.raises(UsageError) as caught:
         read_profile("zynq7000")

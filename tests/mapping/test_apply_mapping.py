@@ -109,6 +109,32 @@ def test_a_name_that_is_in_no_encoding_is_refused_in_one_line(tmp_path: Path) ->
     assert path.read_bytes() == before
 
 
+@pytest.mark.parametrize(
+    ("before", "after"),
+    [
+        (
+            'image   =   rossub,node ,  image_msg,\t"/image"   # the picture\n',
+            'image   =   rossub, node, sensor_msgs/Image, "/image", hw   # the picture\n',
+        ),
+        (
+            'image: rossub, node, image_msg, "/image"\n',
+            'image: rossub, node, sensor_msgs/Image, "/image", hw\n',
+        ),
+        (
+            'image =\n  rossub, node, # whose\n  image_msg, ; what\n  "/image"\n',
+            'image =\n  rossub, node, sensor_msgs/Image, "/image", hw # whose\n   ; what\n',
+        ),
+    ],
+    ids=["odd spacing", "a colon", "several lines"],
+)
+def test_of_a_line_that_changes_only_the_value_changes(tmp_path: Path, before: str, after: str) -> None:
+    line = 'image = rossub, node, image_msg, "/image"\n'
+    path = write(tmp_path, CAMERA.replace(line, before))
+    apply_rule(path)
+    assert path.read_text(encoding="utf-8") == APPLIED.replace(CHANGED[line.strip()] + "\n", after)
+    assert apply_rule(path) == []
+
+
 def test_a_file_without_a_last_line_end(tmp_path: Path) -> None:
     path = write(tmp_path, CAMERA.rstrip("\n"))
     apply_rule(path)

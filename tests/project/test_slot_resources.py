@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 
 from reconros_zenoh.project.ini import Option
 from reconros_zenoh.project.regions import Region, read_regions
-from reconros_zenoh.project.resources import SlotResources, slot_resources
+from reconros_zenoh.project.resources import SlotResources, resources_by_slot, slot_resources
+from reconros_zenoh.project.slots import HwSlot
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -70,6 +71,16 @@ def test_block_rams_given_in_both_views_count_once() -> None:
 def test_an_ultrascale_slice_has_eight_luts() -> None:
     regions = read("SLICE_X0Y0:SLICE_X0Y9, DSP48E2_X0Y0:DSP48E2_X0Y2, URAM288_X0Y0:URAM288_X0Y3")
     assert slot_resources(regions) == SlotResources(80, 3, 0, 0)
+
+
+def test_one_slot_gives_the_family_of_all_slots_of_the_device_away() -> None:
+    regions = ("SLICE_X0Y0:SLICE_X0Y9", "SLICE_X1Y0:SLICE_X1Y4, DSP48E2_X0Y0:DSP48E2_X0Y2")
+    slots = [
+        HwSlot(number, f"slot({number})", None, True, read(text), None, 1)
+        for number, text in enumerate(regions)
+    ]
+    assert resources_by_slot(slots) == {0: SlotResources(80, 0, 0, 0), 1: SlotResources(40, 3, 0, 0)}
+    assert resources_by_slot(slots[:1]) == {0: SlotResources(40, 0, 0, 0)}
 
 
 def test_no_regions() -> None:
