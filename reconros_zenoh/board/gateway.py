@@ -117,7 +117,7 @@ class Gateway:
             case core.Publish(streamed):
                 streamed.timeline.mark("gateway")
                 self.to_smt += 1
-                yield from self._writer.publish(streamed.message, self._board.osif, streamed.timeline)
+                yield from self._writer.publish(streamed.message, streamed.timeline)
                 return core.Published()
 
     def _poll(self) -> Generator[Awaitable, object, core.Event]:

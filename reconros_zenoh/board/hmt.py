@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Hashable
 
     from reconros_zenoh.board.board import Board
-    from reconros_zenoh.board.osif import Osif
     from reconros_zenoh.board.spans import Timeline
     from reconros_zenoh.clock.activity import Awaitable
     from reconros_zenoh.gateway.filters import PublisherFilter
@@ -309,7 +308,7 @@ class HmtWriter:
     def send(self, encoded: Any, timeline: Timeline) -> None:
         """Do nothing: `encode` has raised."""
 
-    def publish(self, message: object, osif: Osif, timeline: Timeline) -> Generator[Awaitable, object, None]:  # noqa: ARG002
+    def publish(self, message: object, timeline: Timeline) -> Generator[Awaitable, object, None]:
         """Return when the message has passed the stream, after waiting for room where a FIFO blocks.
 
         Subscribers get the message as it is now; what the callback does with it afterwards is its own affair.
