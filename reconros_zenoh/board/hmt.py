@@ -136,8 +136,8 @@ class HardwareTopic:
     One message passes at a time, to all subscribers at once, in the order in which publishers found room: one
     that has to wait does not keep another from passing, or a gateway that is about to write could not go on
     to read. A publisher publishes one message at a time. A message takes its size through the stream's
-    bandwidth; bodies, which must not change any more, are handed over by reference. `overhead_ns` is what a
-    subscribing slot needs to take a message over. `has_callback` says that not only gateways have ends of it.
+    bandwidth; bodies, which must not change any more, are handed over by reference. A subscribing slot
+    takes it over in the profile's `hmt.overhead`. `has_callback` says that not only gateways have ends of it.
     """
 
     def __init__(self, board: Board, topic: str, message_type: MessageType) -> None:

@@ -1,6 +1,6 @@
 """A network without Zenoh: messages are events of the environment.
 
-What a link costs is not here: the board's network interface charges it.
+What a link costs is not here: the board's communication stack charges it.
 """
 
 from __future__ import annotations
