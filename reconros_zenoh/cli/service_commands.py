@@ -164,16 +164,13 @@ def _parser(verb: str) -> Any:
 
 def _check_clients(plan: DeploymentPlan, nodes: Mapping[str, YamlNode]) -> None:
     """Raise FileError for a client, camera or robot that could never begin."""
-    domains = {name: client.domain for name, client in plan.clients.items()}
-    domains |= {name: camera.domain for name, camera in plan.cameras.items()}
-    domains |= {name: robot.domain for name, robot in plan.robots.items()}
-    for name, domain in domains.items():
-        if not plan.place(domain):
-            raise (
-                nodes[name]
-                .mapping()["command"]
-                .error(f"asks in domain {domain}, where no board is.", "Give a board the same --domain.")
-            )
+    waiting: dict[str, ClientOptions | CameraOptions] = {**plan.clients, **plan.cameras}
+    asking: dict[str, ClientOptions | CameraOptions | RobotOptions] = {**waiting, **plan.robots}
+    for name, each in asking.items():
+        if not plan.place(each.domain):
+            command = nodes[name].mapping()["command"]
+            problem = f"asks in domain {each.domain}, where no board is."
+            raise command.error(problem, "Give a board the same --domain.")
     groups: defaultdict[str | None, set[str]] = defaultdict(set)
     for client in plan.clients.values():
         groups[client.group].add(client.name)
@@ -181,13 +178,12 @@ def _check_clients(plan: DeploymentPlan, nodes: Mapping[str, YamlNode]) -> None:
         groups[camera.group].add("camera")
     for viewer in plan.viewers.values():
         groups[viewer.group].add("viewer")
-    waiting: dict[str, ClientOptions | CameraOptions] = {**plan.clients, **plan.cameras}
-    for name, each in waiting.items():
-        there = len(groups[each.group])
-        if each.group is not None and there < each.members:
+    for name, member in waiting.items():
+        there = len(groups[member.group])
+        if member.group is not None and there < member.members:
             command = nodes[name].mapping()["command"]
             raise command.error(
-                f"waits for {each.members} clients of the group {each.group!r}, which has {there}.",
+                f"waits for {member.members} clients of the group {member.group!r}, which has {there}.",
                 "Correct --members or add the clients.",
             )
 
