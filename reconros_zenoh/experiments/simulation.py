@@ -82,7 +82,7 @@ class Simulation:
 
         Raise UsageError when it cannot host the project, or the trace cannot be written.
         """
-        transport = self._network.transport(f"{next(self._sessions):x}")
+        transport = self.context().transport
         board = HostedBoard(self.environment, transport, profile, project, mapping, options)
         self._closing.callback(board.close)
         self._closing.enter_context(traced_to(options.trace, board.board))
