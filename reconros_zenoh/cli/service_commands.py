@@ -71,7 +71,6 @@ def read_deployment(path: Path, environment: Mapping[str, str], *, has_end: bool
         elif verb == "client":
             clients[name] = ClientOptions(
                 str(given["name"]),
-                given["router"],
                 given["requests"],
                 given["limit"],
                 given["wait"],
@@ -82,7 +81,6 @@ def read_deployment(path: Path, environment: Mapping[str, str], *, has_end: bool
             )
         elif verb == "camera":
             cameras[name] = CameraOptions(
-                given["router"],
                 given["pictures"],
                 given["rate"],
                 given["wait"],
@@ -91,11 +89,9 @@ def read_deployment(path: Path, environment: Mapping[str, str], *, has_end: bool
                 given["members"],
             )
         elif verb == "viewer":
-            viewers[name] = ViewerOptions(given["router"], domain=given["domain"], group=given["group"])
+            viewers[name] = ViewerOptions(domain=given["domain"], group=given["group"])
         elif verb == "robot":
-            robots[name] = RobotOptions(
-                given["router"], given["pictures"], wait_s=given["wait"], domain=given["domain"]
-            )
+            robots[name] = RobotOptions(given["pictures"], wait_s=given["wait"], domain=given["domain"])
     plan = DeploymentPlan(boards, clients, cameras, viewers, robots)
     _check_clients(plan, nodes)
     _check_end(plan, nodes, has_end=has_end)

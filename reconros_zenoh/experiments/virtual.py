@@ -70,13 +70,7 @@ def add_board_and_clients(
     hosted = simulation.add_board(profile, project, project.mapping(str(mapping)), BoardOptions(seed=seed))
     for client in CLIENTS:
         options = ClientOptions(
-            client,
-            "",
-            requests,
-            limit_s=ANSWER_LIMIT_S,
-            seed=seed,
-            group="roundtrip",
-            members=len(CLIENTS),
+            client, requests, ANSWER_LIMIT_S, seed=seed, group="roundtrip", members=len(CLIENTS)
         )
         simulation.add_client(options, partial(on_round_trip, client))
     return hosted
