@@ -134,15 +134,16 @@ class Gateway:
     def _write_hmt(self, event: Event) -> Generator[Awaitable, object, None]:
         event.timeline.callback = self._label
         event.timeline.mark("gateway")
-        sender = event.publisher.hex()
         read = Signal()
         Activity(self._read(event.size, read))
         try:
-            yield from self._topic.publish(self, event.message, event.size, event.timeline, sender, read)
+            yield from self._topic.publish(
+                self, event.message, event.size, event.timeline, event.publisher, read
+            )
             self.to_hmt += 1
         except BadMessageError as error:
             self.refused += 1
-            self._board.context.rejections.add(self._topic.key, sender, error)
+            self._board.context.rejections.add(self._topic.key, event.publisher, error)
         yield read
 
     def _read(self, size: int, done: Signal) -> Generator[Awaitable, object, None]:

@@ -56,8 +56,8 @@ class Streamed(NamedTuple):
 
     `timeline` is the publisher's; of a message in a FIFO it is the reader's, which begins with `complete`.
     `read` fires when its last word has come from where it is read; None where all is there from the start.
-    `publisher` wrote it to the stream, for the filters; `sender` sent it first, for the log: the gid in
-    hexadecimal of who published it in software, or the name of the hardware callback.
+    `publisher` wrote it to the stream, for the filters; `sender` sent it first, for the log: the gid of who
+    published it in software, or the name of the hardware callback.
     """
 
     publisher: Hashable
@@ -66,7 +66,7 @@ class Streamed(NamedTuple):
     targets: list[Fifo]
     timeline: Timeline
     complete: Signal
-    sender: str | None
+    sender: bytes | str | None
     read: Signal | None
 
 
@@ -186,7 +186,7 @@ class HardwareTopic:
         message: Any,
         size: int,
         timeline: Timeline,
-        sender: str | None = None,
+        sender: bytes | str | None = None,
         read: Signal | None = None,
     ) -> Generator[Awaitable, object, None]:
         """Return when the message of `size` bytes on the wire has passed; the others as in `Streamed`.
