@@ -46,12 +46,11 @@ class LocalRunner:
         log_folder: Path,
         environment: Mapping[str, str],
         *,
-        on_event: Callable[[str, ServiceState], None] | None = None,
+        on_event: Callable[[str, ServiceState], None] = lambda _service, _state: None,
         stop_limit_s: float = 10.0,
     ) -> None:
         self._deployment = deployment
         self._log_folder = log_folder
-        self._on_event = on_event
         self._stop_limit_ns = round(stop_limit_s * 10**9)
         # Whatever happens is a call, put here by a thread that waits for a child; a signal only rings.
         self._events: deque[Callable[[], None]] = deque()
@@ -66,7 +65,7 @@ class LocalRunner:
                 log_folder / f"{name}.log",
                 own_environment,
                 self._put,
-                partial(self._tell, name),
+                partial(on_event, name),
             )
             for name in order.static_order()
         }
@@ -201,7 +200,3 @@ class LocalRunner:
             if not living:
                 return
             self._wait()
-
-    def _tell(self, name: str, state: ServiceState) -> None:
-        if self._on_event is not None:
-            self._on_event(name, state)

@@ -193,8 +193,8 @@ class ServiceRun:
 
     def _check_exited(self, status: int) -> None:
         check, self._check = self._check, None
-        if check is None or self._health is None:
-            return
+        assert check is not None
+        assert self._health is not None
         with check.output:
             lines = last_lines(check.output, _TAIL_LINES)
         if self._stopping or self.state is not ServiceState.STARTED:

@@ -25,7 +25,6 @@ _ON_THE_WAY_NS = 2 * _SECOND_NS
 class CameraOptions:
     """What a camera is told; with `group` it begins once its `members` are there."""
 
-    router: str
     pictures: int
     rate_hz: float = 5.0
     wait_s: float = 30.0

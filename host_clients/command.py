@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from reconros_zenoh.measure.record import RoundTrip
 
 
-def make_round_trips(options: ClientOptions, out: Path | None, *, as_json: bool) -> int:
+def make_round_trips(router: str, options: ClientOptions, out: Path | None, *, as_json: bool) -> int:
     """Run the client, print what came out, and return the exit status.
 
     0: all requests were answered rightly; 1: one was lost or answered wrongly; 130: ended by a signal before.
@@ -30,7 +30,7 @@ def make_round_trips(options: ClientOptions, out: Path | None, *, as_json: bool)
             if writer:
                 writer.write(round_trip)
 
-        complete = run_client(options, record)
+        complete = run_client(router, options, record)
     made = Record.of(options.name, round_trips)
     summary = summarise(made.values_ms, made.lost, made.wrong)
     if as_json:

@@ -28,7 +28,6 @@ class ClientOptions:
     """
 
     name: str
-    router: str
     requests: int
     limit_s: float = 2.0
     wait_s: float = 30.0
@@ -38,13 +37,13 @@ class ClientOptions:
     members: int = 1
 
 
-def run_client(options: ClientOptions, on_round_trip: Callable[[RoundTrip], None]) -> bool:
+def run_client(router: str, options: ClientOptions, on_round_trip: Callable[[RoundTrip], None]) -> bool:
     """Make the round trips; return True when all were made, False after SIGINT or SIGTERM.
 
     Raise TransportError when there is no router, or when no board answers within `wait_s`.
     """
     environment, stop = begin_process()
-    with ZenohTransport.open(options.router) as transport:
+    with ZenohTransport.open(router) as transport:
         node = Context(transport, options.domain).node(f"{options.name}_client")
         start = environment.event()
         loop = ClosedLoop(

@@ -37,7 +37,6 @@ if TYPE_CHECKING:
 class ViewerOptions:
     """What a viewer is told: where its records and pictures go, and the port of its page if there is one."""
 
-    router: str
     out: Path | None = None
     view: int | None = None
     rate_hz: float = 5.0
@@ -46,14 +45,14 @@ class ViewerOptions:
     members: int = 1
 
 
-def run_camera(options: CameraOptions, on_ready: Callable[[], None]) -> int:
+def run_camera(router: str, options: CameraOptions, on_ready: Callable[[], None]) -> int:
     """Publish the pictures and return how many were: fewer than asked for after SIGINT or SIGTERM.
 
     `on_ready` is called when a signal would end it. Raise TransportError when there is no router, or nobody
     subscribes within `wait_s`.
     """
     environment, stop = begin_process()
-    with ZenohTransport.open(options.router) as transport:
+    with ZenohTransport.open(router) as transport:
         start = environment.event()
         camera = Camera(environment, Context(transport, options.domain), TypeRegistry(), options, start)
         gather(transport, environment, start, options.group, "camera", options.members)
@@ -62,7 +61,7 @@ def run_camera(options: CameraOptions, on_ready: Callable[[], None]) -> int:
         return camera.sent
 
 
-def run_viewer(options: ViewerOptions, on_ready: Callable[[str | None], None]) -> dict[str, int]:
+def run_viewer(router: str, options: ViewerOptions, on_ready: Callable[[str | None], None]) -> dict[str, int]:
     """Record what comes until SIGINT or SIGTERM; return how many pictures and servo indices came.
 
     `on_ready` gets the address of the page, None without one. Records are filter.csv and control.csv.
@@ -72,7 +71,7 @@ def run_viewer(options: ViewerOptions, on_ready: Callable[[str | None], None]) -
     counts = {"pictures": 0, "indices": 0}
     gallery = Gallery()
     with ExitStack() as closing:
-        transport = closing.enter_context(ZenohTransport.open(options.router))
+        transport = closing.enter_context(ZenohTransport.open(router))
         records = {
             name: closing.enter_context(RecordWriter(options.out / f"{name}.csv"))
             for name in ("filter", "control")
@@ -106,7 +105,7 @@ def run_viewer(options: ViewerOptions, on_ready: Callable[[str | None], None]) -
     return counts
 
 
-def run_robot(options: RobotOptions, on_ready: Callable[[str | None], None]) -> DrivingRobot:
+def run_robot(router: str, options: RobotOptions, on_ready: Callable[[str | None], None]) -> DrivingRobot:
     """Drive, and return the robot when its pictures are taken, or after SIGINT or SIGTERM.
 
     `on_ready` gets the address of the page, None without one. The record is robot.csv. Raise TransportError
@@ -114,7 +113,7 @@ def run_robot(options: RobotOptions, on_ready: Callable[[str | None], None]) -> 
     """
     environment, stop = begin_process()
     with ExitStack() as closing:
-        transport = closing.enter_context(ZenohTransport.open(options.router))
+        transport = closing.enter_context(ZenohTransport.open(router))
         record = server = None
         if options.out is not None:
             record = closing.enter_context(RecordWriter(options.out / "robot.csv"))

@@ -35,7 +35,6 @@ _FASTEST = 10.0
 class RobotOptions:
     """What a robot is told: where its record goes, and the port of its page, if there are any."""
 
-    router: str
     pictures: int
     out: Path | None = None
     view: int | None = None

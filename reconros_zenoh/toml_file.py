@@ -15,6 +15,12 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
+    from pydantic import ValidationError
+    from pydantic_core import ErrorDetails
+
+UNKNOWN_KEY = "extra_forbidden"
+"""What pydantic calls a key that there is not."""
+
 # What the parser raises but for its own error; both are limits of Python.
 _BEYOND: dict[type[Exception], str] = {
     RecursionError: "is nested too deeply.",
@@ -73,6 +79,14 @@ class TomlFile:
             if depth:
                 return start
         return None
+
+
+def first_mistake(error: ValidationError) -> ErrorDetails:
+    """Return the mistake to tell of.
+
+    A misspelt key is an unknown one and a missing one: the unknown one stands in the file.
+    """
+    return min(error.errors(), key=lambda mistake: mistake["type"] != UNKNOWN_KEY)
 
 
 def _find_header(lines: Sequence[str], tables: Sequence[str]) -> int | None:

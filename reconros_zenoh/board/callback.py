@@ -262,7 +262,7 @@ class HardwareThread(DelegateCalls):
         """
         if isinstance(message, InitData):
             message = self._in_memory(message)
-        yield from writer.publish(message, self._osif, self._timeline)
+        yield from writer.publish(message, self._timeline)
 
     @noted
     def call(self, client: ClientSource, request: object) -> Generator[Awaitable, object, int]:

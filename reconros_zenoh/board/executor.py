@@ -206,9 +206,9 @@ class Executor:
                 partial(self._became_ready, entry), check, in_hardware=bool(registration.slots)
             )
 
-    def select(self, worker: Worker, resource: int) -> Dispatch | None:
+    def select(self, worker: Worker) -> Dispatch | None:
         """Return the callback that this worker must run now, its message taken, or None."""
-        dispatch = self._policy.select(worker, resource)
+        dispatch = self._policy.select(worker, worker.resource)
         if dispatch is not None:
             self.calls[dispatch.entry.name] += 1
         return dispatch

@@ -117,7 +117,7 @@ class Gateway:
             case core.Publish(streamed):
                 streamed.timeline.mark("gateway")
                 self.to_smt += 1
-                yield from self._writer.publish(streamed.message, self._board.osif, streamed.timeline)
+                yield from self._writer.publish(streamed.message, streamed.timeline)
                 return core.Published()
 
     def _poll(self) -> Generator[Awaitable, object, core.Event]:
@@ -134,15 +134,16 @@ class Gateway:
     def _write_hmt(self, event: Event) -> Generator[Awaitable, object, None]:
         event.timeline.callback = self._label
         event.timeline.mark("gateway")
-        sender = event.publisher.hex()
         read = Signal()
         Activity(self._read(event.size, read))
         try:
-            yield from self._topic.publish(self, event.message, event.size, event.timeline, sender, read)
+            yield from self._topic.publish(
+                self, event.message, event.size, event.timeline, event.publisher, read
+            )
             self.to_hmt += 1
         except BadMessageError as error:
             self.refused += 1
-            self._board.context.rejections.add(self._topic.key, sender, error)
+            self._board.context.rejections.add(self._topic.key, event.publisher, error)
         yield read
 
     def _read(self, size: int, done: Signal) -> Generator[Awaitable, object, None]:

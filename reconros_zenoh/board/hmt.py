@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Hashable
 
     from reconros_zenoh.board.board import Board
-    from reconros_zenoh.board.osif import Osif
     from reconros_zenoh.board.spans import Timeline
     from reconros_zenoh.clock.activity import Awaitable
     from reconros_zenoh.gateway.filters import PublisherFilter
@@ -57,8 +56,8 @@ class Streamed(NamedTuple):
 
     `timeline` is the publisher's; of a message in a FIFO it is the reader's, which begins with `complete`.
     `read` fires when its last word has come from where it is read; None where all is there from the start.
-    `publisher` wrote it to the stream, for the filters; `sender` sent it first, for the log: the gid in
-    hexadecimal of who published it in software, or the name of the hardware callback.
+    `publisher` wrote it to the stream, for the filters; `sender` sent it first, for the log: the gid of who
+    published it in software, or the name of the hardware callback.
     """
 
     publisher: Hashable
@@ -67,7 +66,7 @@ class Streamed(NamedTuple):
     targets: list[Fifo]
     timeline: Timeline
     complete: Signal
-    sender: str | None
+    sender: bytes | str | None
     read: Signal | None
 
 
@@ -137,8 +136,8 @@ class HardwareTopic:
     One message passes at a time, to all subscribers at once, in the order in which publishers found room: one
     that has to wait does not keep another from passing, or a gateway that is about to write could not go on
     to read. A publisher publishes one message at a time. A message takes its size through the stream's
-    bandwidth; bodies, which must not change any more, are handed over by reference. `overhead_ns` is what a
-    subscribing slot needs to take a message over. `has_callback` says that not only gateways have ends of it.
+    bandwidth; bodies, which must not change any more, are handed over by reference. A subscribing slot
+    takes it over in the profile's `hmt.overhead`. `has_callback` says that not only gateways have ends of it.
     """
 
     def __init__(self, board: Board, topic: str, message_type: MessageType) -> None:
@@ -187,7 +186,7 @@ class HardwareTopic:
         message: Any,
         size: int,
         timeline: Timeline,
-        sender: str | None = None,
+        sender: bytes | str | None = None,
         read: Signal | None = None,
     ) -> Generator[Awaitable, object, None]:
         """Return when the message of `size` bytes on the wire has passed; the others as in `Streamed`.
@@ -311,7 +310,7 @@ class HmtWriter:
     def send(self, encoded: Any, timeline: Timeline) -> None:
         """Do nothing: `encode` has raised."""
 
-    def publish(self, message: object, osif: Osif, timeline: Timeline) -> Generator[Awaitable, object, None]:  # noqa: ARG002
+    def publish(self, message: object, timeline: Timeline) -> Generator[Awaitable, object, None]:
         """Return when the message has passed the stream, after waiting for room where a FIFO blocks.
 
         Subscribers get the message as it is now; what the callback does with it afterwards is its own affair.

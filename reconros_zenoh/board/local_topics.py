@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from collections.abc import Generator
 
     from reconros_zenoh.board.board import Board
-    from reconros_zenoh.board.osif import Osif
     from reconros_zenoh.board.profile import Model, TopicsSection
     from reconros_zenoh.board.sources import SubscriptionSource
     from reconros_zenoh.clock.activity import Awaitable
@@ -180,7 +179,6 @@ class LocalTopicWriter(TopicWriter):
     ) -> None:
         qos = QosProfile.or_default(qos)
         super().__init__(board, node, message_type, topic, qos)
-        self._board = board
         self._topics = topics
         self._in_place = in_place
         # The transport keeps what is sent for those who come late elsewhere.
@@ -204,7 +202,7 @@ class LocalTopicWriter(TopicWriter):
         message, parts = encoded
         self._publications.put(_Sent(message, parts, timeline))
 
-    def publish(self, message: object, osif: Osif, timeline: Timeline) -> Generator[Awaitable, object, None]:  # noqa: ARG002
+    def publish(self, message: object, timeline: Timeline) -> Generator[Awaitable, object, None]:
         """Return when the delegate has published; its call is part of what a publication costs."""
         message, parts = self.encode(message)
         yield from self._publish(_Sent(message, parts, timeline.fork()), hardware=True)

@@ -23,12 +23,9 @@ from reconros_zenoh.board.quantity import (
     Size,
 )
 from reconros_zenoh.errors import FileError, UsageError
-from reconros_zenoh.toml_file import TomlFile
+from reconros_zenoh.toml_file import UNKNOWN_KEY, TomlFile, first_mistake
 
 _FOLDER = Path(str(resources.files("reconros_zenoh.board"))) / "profiles"
-
-_UNKNOWN_KEY = "extra_forbidden"
-"""What pydantic calls it."""
 
 _NATIVE_BITSTREAM_SIZE = 4096
 """Where nothing is modelled a bitstream only has to exist."""
@@ -246,12 +243,11 @@ def read_profile(name_or_file: str) -> Profile:
     try:
         return Profile.model_validate(toml.content)
     except ValidationError as error:
-        # A misspelt key is an unknown one and a missing one: the unknown one stands in the file.
-        first = min(error.errors(), key=lambda mistake: mistake["type"] != _UNKNOWN_KEY)
+        first = first_mistake(error)
         place = [str(key) for key in first["loc"]]
         key = ".".join(place)
         problem, remedy = f"{first['msg']}.", f"Correct {key}; the shipped profiles show every key."
-        if first["type"] == _UNKNOWN_KEY:
+        if first["type"] == UNKNOWN_KEY:
             problem = "there is no such key."
             missing = [
                 str(mistake["loc"][-1])

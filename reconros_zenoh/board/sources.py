@@ -220,7 +220,7 @@ class SubscriptionSource(Reader):
             if self._check is not None:
                 self._check(received.message)
         except BadMessageError as error:
-            self._board.context.rejections.add(self._topic, received.publisher.hex(), error)
+            self._board.context.rejections.add(self._topic, received.publisher, error)
             return
         self._stream.put((received, timeline, way))
 

@@ -58,7 +58,7 @@ class Worker(ABC):
 
     def _run(self) -> Generator[Awaitable, object, None]:
         while True:
-            dispatch = self._executor.select(self, self.resource)
+            dispatch = self._executor.select(self)
             if dispatch is None:
                 dispatch = yield from self._wait()
             event = cast("Event", dispatch.message)
@@ -78,7 +78,7 @@ class Worker(ABC):
             delay_ns = self._executor.until_poll_ns(self._poll_ns, self._environment.now - idle_since_ns)
             if delay_ns:
                 yield self._environment.timeout(delay_ns)
-            dispatch = self._executor.select(self, self.resource)
+            dispatch = self._executor.select(self)
             if dispatch is not None:
                 return dispatch
 

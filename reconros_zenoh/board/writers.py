@@ -13,7 +13,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Sequence
 
     from reconros_zenoh.board.board import Board
-    from reconros_zenoh.board.osif import Osif
     from reconros_zenoh.board.spans import Timeline
     from reconros_zenoh.clock.activity import Awaitable
     from reconros_zenoh.rmw.node import Node
@@ -39,7 +38,7 @@ class MessageWriter(Protocol):
     def send(self, encoded: Any, timeline: Timeline) -> None:
         """Publish what `encode` returned: the way of a software callback."""
 
-    def publish(self, message: object, osif: Osif, timeline: Timeline) -> Generator[Awaitable, object, None]:
+    def publish(self, message: object, timeline: Timeline) -> Generator[Awaitable, object, None]:
         """Publish the message: the way of a hardware thread, which goes on when this returns."""
 
 
@@ -100,6 +99,7 @@ class TopicWriter:
         self, board: Board, node: Node, message_type: MessageType, topic: str, qos: QosProfile | None = None
     ) -> None:
         qos = QosProfile.or_default(qos)
+        self._board = board
         self._writer = Writer(board, qos)
         self._publisher = node.publisher(message_type, topic, qos)
         self.topic = self._publisher.name
@@ -133,8 +133,8 @@ class TopicWriter:
         """Publish an encoded message."""
         self._writer.put(encoded, timeline, partial(self._publisher.publish_encoded, encoded))
 
-    def publish(self, message: object, osif: Osif, timeline: Timeline) -> Generator[Awaitable, object, None]:
+    def publish(self, message: object, timeline: Timeline) -> Generator[Awaitable, object, None]:
         """Publish the message through the delegate: ROS_PUBLISHER_PUBLISH."""
-        yield from osif.call()
+        yield from self._board.osif.call()
         timeline.mark("osif")
         self.send(self.encode(message), timeline.fork())

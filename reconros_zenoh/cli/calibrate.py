@@ -16,7 +16,6 @@ from reconros_zenoh.cli.progress import run_bar
 from reconros_zenoh.errors import UsageError
 from reconros_zenoh.experiments.calibration import (
     Calibration,
-    FittedCell,
     calibrated_constants,
     planned_evaluations,
 )
@@ -25,8 +24,8 @@ from reconros_zenoh.experiments.interruption import until_interrupted
 from reconros_zenoh.experiments.measured import read_measurements
 from reconros_zenoh.experiments.profile_file import replacing, with_values
 from reconros_zenoh.experiments.roundtrip import application
-from reconros_zenoh.measure.compare import grade
-from reconros_zenoh.measure.statistics import format_error, format_ms
+from reconros_zenoh.measure.compare import error_text
+from reconros_zenoh.measure.statistics import format_ms
 from reconros_zenoh.toml_file import TomlFile
 
 if TYPE_CHECKING:
@@ -161,7 +160,10 @@ def _print(console: Console, found: Calibration) -> None:
             Text(cell.mapping),
             cell.client,
             *(format_ms(side[1]) for side in (cell.measured_ms, cell.before_ms, cell.after_ms)),
-            *_errors(cell),
+            *(
+                error_text(ours / real - 1)
+                for ours, real in zip(cell.after_ms, cell.measured_ms, strict=True)
+            ),
         )
     console.print(cells)
     title = "Constants, and how much the objective changes when one is 20 % more or less"
@@ -191,9 +193,3 @@ def _print(console: Console, found: Calibration) -> None:
                 style="yellow",
             )
         )
-
-
-def _errors(cell: FittedCell) -> list[Text]:
-    errors = [ours / real - 1 for ours, real in zip(cell.after_ms, cell.measured_ms, strict=True)]
-    styles = {"good": "green", "fair": "yellow", "bad": "red"}
-    return [Text(format_error(error), style=styles[grade(error)]) for error in errors]

@@ -137,8 +137,8 @@ def client(
     from host_clients.command import make_round_trips
     from host_clients.daemon import ClientOptions
 
-    options = ClientOptions(str(name), router, requests, limit, wait, domain, seed, group, members)
-    raise typer.Exit(make_round_trips(options, out, as_json=as_json))
+    options = ClientOptions(str(name), requests, limit, wait, domain, seed, group, members)
+    raise typer.Exit(make_round_trips(router, options, out, as_json=as_json))
 
 
 def status(

@@ -32,7 +32,7 @@ def demo(
     worth: runs in virtual time without it.
     """
     console = wide_console()
-    experiments = []
+    runs = []
     for clock, requests in ((ClockName.WALL, wall_requests), (ClockName.VIRTUAL, virtual_requests)):
         planned = plan(clock, MAPPINGS, requests, 0, out, _PROFILE)
         experiment = run(planned, quiet=False)
@@ -40,11 +40,11 @@ def demo(
         if experiment["interrupted"]:
             print(f"records and experiment.json are in {planned.folder}")
             raise interrupted(quiet=False, measured=bool(experiment["mappings"]))
-        experiments.append(experiment)
+        runs.append(load_run(planned.folder))
     with run_bar("what each mechanism is worth", runs_of_ablation(planned.mappings), quiet=False) as advance:
         ablation = ablate(read_profile(_PROFILE), planned.mappings, _ABLATION_REQUESTS, advance)
-    runs = [load_run(out / clock) for clock in ClockName]
+    experiments, records = zip(*runs, strict=True)
     report = out / "report.html"
-    write_report(report, [experiment for experiment, _ in runs], [records for _, records in runs], ablation)
+    write_report(report, experiments, records, ablation)
     print(f"report: {report}")
     raise typer.Exit(0 if all(map(all_right, experiments)) else 1)

@@ -14,20 +14,12 @@ from reconros_zenoh.cli.console import PlainConsole, interrupted, new_table, wid
 from reconros_zenoh.cli.options import AsJson, ClockName, Out, Profile, Seed
 from reconros_zenoh.cli.progress import run_bar
 from reconros_zenoh.errors import UsageError
+from reconros_zenoh.measure.design_report import FIGURES, format_figure, write_design_report
 from reconros_zenoh.measure.findings import host_troubles
 from reconros_zenoh.measure.statistics import format_ms
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
-
-_ROWS = {
-    "reconfigurations": "reconfigurations",
-    "reconfiguration_ms": "time in them",
-    "frames_in": "pictures taken",
-    "frames_out": "pictures filtered",
-    "control_out": "servo indices",
-    "wrong": "wrong",
-}
 
 
 def design(
@@ -64,7 +56,6 @@ def design(
     from reconros_zenoh.experiments.design_pictures import pictures_of
     from reconros_zenoh.experiments.interruption import until_interrupted
     from reconros_zenoh.experiments.provenance import own_folder
-    from reconros_zenoh.measure.design_report import write_design_report
 
     modelled = read_profile(profile).model is not None
     if clock is ClockName.VIRTUAL and not modelled:
@@ -109,9 +100,8 @@ def design(
 
 def _print_table(console: PlainConsole, variants: Mapping[str, Mapping[str, Any]]) -> None:
     table = new_table(("",), variants)
-    for key, text in _ROWS.items():
-        cells = (variant[key] for variant in variants.values())
-        table.add_row(text, *(_cell(cell, key) for cell in cells))
+    for key, text in FIGURES.items():
+        table.add_row(text, *(format_figure(key, variant[key]) for variant in variants.values()))
     for chain, text in (("filter_ms", "camera to viewer"), ("control_ms", "command to servo index")):
         for point in ("median", "p95"):
             table.add_row(
@@ -122,9 +112,3 @@ def _print_table(console: PlainConsole, variants: Mapping[str, Mapping[str, Any]
     for name, measured in variants.items():
         for trouble in host_troubles(measured["host"]):
             console.print(Text(f"host, {name}: {trouble}", style="yellow"))
-
-
-def _cell(value: float | None, key: str) -> str:
-    if key.endswith("_ms"):
-        return format_ms(value)
-    return "-" if value is None else str(value)

@@ -48,8 +48,8 @@ def camera(
     from host_clients.camera import CameraOptions
     from host_clients.desktop import run_camera
 
-    options = CameraOptions(router, pictures, rate, wait, domain, group, members)
-    sent = run_camera(options, lambda: print("camera: ready", flush=True))
+    options = CameraOptions(pictures, rate, wait, domain, group, members)
+    sent = run_camera(router, options, lambda: print("camera: ready", flush=True))
     print(f"camera: {sent} pictures published", flush=True)
     raise typer.Exit(0 if sent == pictures else 130)
 
@@ -76,8 +76,8 @@ def viewer(
     """
     from host_clients.desktop import ViewerOptions, run_viewer
 
-    options = ViewerOptions(router, out, view, rate, domain, group, members)
-    counts = run_viewer(options, partial(_tell, "viewer"))
+    options = ViewerOptions(out, view, rate, domain, group, members)
+    counts = run_viewer(router, options, partial(_tell, "viewer"))
     print(
         f"viewer: {counts['pictures']} filtered pictures and {counts['indices']} servo indices came",
         flush=True,
@@ -102,7 +102,7 @@ def robot(
     from host_clients.desktop import run_robot
     from host_clients.robot import RobotOptions, most_off_lane_mm, stood_s
 
-    driven = run_robot(RobotOptions(router, pictures, out, view, wait, domain), partial(_tell, "robot"))
+    driven = run_robot(router, RobotOptions(pictures, out, view, wait, domain), partial(_tell, "robot"))
     pictures = len(driven.steps)
     print(f"robot: {pictures} pictures published, {pictures - driven.unanswered} answered", flush=True)
     if driven.unexpected:

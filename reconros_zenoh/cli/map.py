@@ -87,8 +87,9 @@ def map_communication(
     if project is None and (mapping is not None or apply):
         raise UsageError(f"{'--apply' if apply else '--mapping'} needs the folder of a project.")
     rule = map_topics(graph)
+    by_rule = {name: decision.mapping for name, decision in rule.items()}
     predictions = Predictions.of(graph, read_profile(model), rule) if model else None
-    mappings = predictions.mappings if predictions else {name: each.mapping for name, each in rule.items()}
+    mappings = predictions.mappings if predictions else by_rule
     result = summarise(graph, rule, predictions)
     if plot:
         from reconros_zenoh.mapping.drawing import write_drawing  # loads networkx
@@ -101,7 +102,7 @@ def map_communication(
         return
     for warning in result["warnings"]:
         print(printable(f"warning: {warning}"), file=sys.stderr)
-    _print(wide_console(), result, Crossings.of(graph, {name: each.mapping for name, each in rule.items()}))
+    _print(wide_console(), result, Crossings.of(graph, by_rule))
     if plot:
         print(f"drawn to {plot}")
     if apply:

@@ -71,7 +71,6 @@ def read_deployment(path: Path, environment: Mapping[str, str], *, has_end: bool
         elif verb == "client":
             clients[name] = ClientOptions(
                 str(given["name"]),
-                given["router"],
                 given["requests"],
                 given["limit"],
                 given["wait"],
@@ -82,7 +81,6 @@ def read_deployment(path: Path, environment: Mapping[str, str], *, has_end: bool
             )
         elif verb == "camera":
             cameras[name] = CameraOptions(
-                given["router"],
                 given["pictures"],
                 given["rate"],
                 given["wait"],
@@ -91,11 +89,9 @@ def read_deployment(path: Path, environment: Mapping[str, str], *, has_end: bool
                 given["members"],
             )
         elif verb == "viewer":
-            viewers[name] = ViewerOptions(given["router"], domain=given["domain"], group=given["group"])
+            viewers[name] = ViewerOptions(domain=given["domain"], group=given["group"])
         elif verb == "robot":
-            robots[name] = RobotOptions(
-                given["router"], given["pictures"], wait_s=given["wait"], domain=given["domain"]
-            )
+            robots[name] = RobotOptions(given["pictures"], wait_s=given["wait"], domain=given["domain"])
     plan = DeploymentPlan(boards, clients, cameras, viewers, robots)
     _check_clients(plan, nodes)
     _check_end(plan, nodes, has_end=has_end)
@@ -164,16 +160,13 @@ def _parser(verb: str) -> Any:
 
 def _check_clients(plan: DeploymentPlan, nodes: Mapping[str, YamlNode]) -> None:
     """Raise FileError for a client, camera or robot that could never begin."""
-    domains = {name: client.domain for name, client in plan.clients.items()}
-    domains |= {name: camera.domain for name, camera in plan.cameras.items()}
-    domains |= {name: robot.domain for name, robot in plan.robots.items()}
-    for name, domain in domains.items():
-        if not plan.place(domain):
-            raise (
-                nodes[name]
-                .mapping()["command"]
-                .error(f"asks in domain {domain}, where no board is.", "Give a board the same --domain.")
-            )
+    waiting: dict[str, ClientOptions | CameraOptions] = {**plan.clients, **plan.cameras}
+    asking: dict[str, ClientOptions | CameraOptions | RobotOptions] = {**waiting, **plan.robots}
+    for name, each in asking.items():
+        if not plan.place(each.domain):
+            command = nodes[name].mapping()["command"]
+            problem = f"asks in domain {each.domain}, where no board is."
+            raise command.error(problem, "Give a board the same --domain.")
     groups: defaultdict[str | None, set[str]] = defaultdict(set)
     for client in plan.clients.values():
         groups[client.group].add(client.name)
@@ -181,13 +174,12 @@ def _check_clients(plan: DeploymentPlan, nodes: Mapping[str, YamlNode]) -> None:
         groups[camera.group].add("camera")
     for viewer in plan.viewers.values():
         groups[viewer.group].add("viewer")
-    waiting: dict[str, ClientOptions | CameraOptions] = {**plan.clients, **plan.cameras}
-    for name, each in waiting.items():
-        there = len(groups[each.group])
-        if each.group is not None and there < each.members:
+    for name, member in waiting.items():
+        there = len(groups[member.group])
+        if member.group is not None and there < member.members:
             command = nodes[name].mapping()["command"]
             raise command.error(
-                f"waits for {each.members} clients of the group {each.group!r}, which has {there}.",
+                f"waits for {member.members} clients of the group {member.group!r}, which has {there}.",
                 "Correct --members or add the clients.",
             )
 

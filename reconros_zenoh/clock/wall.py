@@ -34,10 +34,8 @@ _LAGS_KEPT = 1 << 16
 class Lag:
     """How late the event loop was over its last events: percentiles of start minus due time [us]."""
 
-    events: int
     p50_us: float
     p99_us: float
-    max_us: float
 
 
 class WallEnvironment(VirtualEnvironment):
@@ -113,9 +111,9 @@ class WallEnvironment(VirtualEnvironment):
         """Return how late the loop was over the last events that had a time of their own."""
         lags = np.array(self._lags_ns, dtype=np.int64)
         if not len(lags):
-            return Lag(0, 0.0, 0.0, 0.0)
+            return Lag(0.0, 0.0)
         p50, p99 = np.percentile(lags, (50, 99)) / 1e3
-        return Lag(len(lags), float(p50), float(p99), float(lags.max()) / 1e3)
+        return Lag(float(p50), float(p99))
 
     def forget_lag(self) -> None:
         """Let `lag` speak of later events only."""

@@ -47,7 +47,7 @@ def _run_variant(plan: DesignPlan, variant: str, endings: dict[str, Ending]) -> 
             records.enter_context(RecordWriter(folder / f"{name}.csv")) for name in ("filter", "control")
         )
         simulation.add_viewer(0, pictures.write, indices.write, gallery.add)
-        camera = simulation.add_camera(CameraOptions("", plan.pictures, RATE_HZ))
+        camera = simulation.add_camera(CameraOptions(plan.pictures, RATE_HZ))
         try:
             simulation.run()
         finally:

@@ -91,7 +91,7 @@ def run_variant(profile: Profile, variant: str, pictures: int) -> Drive:
         )
         simulation.add_board(profile, project, project.mapping(None), BoardOptions())
         trips: list[RoundTrip] = []
-        robot = simulation.add_robot(RobotOptions("", pictures), trips.append)
+        robot = simulation.add_robot(RobotOptions(pictures), trips.append)
         simulation.run()
     sections_ms = {
         int(name.rpartition(".")[2]): [ns / 1e6 for ns in sections]

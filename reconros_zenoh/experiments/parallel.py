@@ -14,7 +14,7 @@ import numpy as np
 from reconros_zenoh.errors import ExperimentError
 from reconros_zenoh.experiments.interruption import terminal_signals_blocked
 from reconros_zenoh.experiments.roundtrip import CLIENTS
-from reconros_zenoh.experiments.virtual import run_mapping
+from reconros_zenoh.experiments.virtual import run_clients
 from reconros_zenoh.measure.record import Record
 
 if TYPE_CHECKING:
@@ -91,5 +91,5 @@ def _end_with_parent() -> None:
 def records_of(run: Run) -> dict[str, Record]:
     """Return the record of each client after one run, made here and now."""
     round_trips: dict[str, list[RoundTrip]] = {client: [] for client in CLIENTS}
-    run_mapping(*run, lambda client, round_trip: round_trips[client].append(round_trip))
+    run_clients(*run, lambda client, round_trip: round_trips[client].append(round_trip))
     return {client: Record.of(client, made) for client, made in round_trips.items()}

@@ -82,14 +82,14 @@ class Simulation:
 
         Raise UsageError when it cannot host the project, or the trace cannot be written.
         """
-        transport = self._network.transport(f"{next(self._sessions):x}")
+        transport = self.context().transport
         board = HostedBoard(self.environment, transport, profile, project, mapping, options)
         self._closing.callback(board.close)
         self._closing.enter_context(traced_to(options.trace, board.board))
         return board
 
     def add_client(self, options: ClientOptions, on_round_trip: Callable[[RoundTrip], None]) -> None:
-        """Have a client make its round trips; `router` says nothing here."""
+        """Have a client make its round trips."""
         context = self.context(options.domain)
         start = self.environment.event()
         loop = ClosedLoop(
@@ -113,7 +113,7 @@ class Simulation:
         )
 
     def add_camera(self, options: CameraOptions) -> Camera:
-        """Return a camera; `router` says nothing here."""
+        """Return a camera."""
         context = self.context(options.domain)
         start = self.environment.event()
         camera = Camera(self.environment, context, self._types, options, start)
@@ -122,7 +122,7 @@ class Simulation:
         return camera
 
     def add_robot(self, options: RobotOptions, on_trip: Callable[[RoundTrip], None]) -> DrivingRobot:
-        """Return a robot of the driving example; `router`, `out` and `view` say nothing here."""
+        """Return a robot of the driving example; `out` and `view` say nothing here."""
         context = self.context(options.domain)
         robot = DrivingRobot(self.environment, context, self._types, options, on_trip)
         self._done.append(robot.done)

@@ -41,7 +41,7 @@ def run_virtual(plan: Plan, report: BoardReport, on_progress: Callable[[str, str
                 report.statuses[mapping] = status(hosted.board, hosted.executor)
 
 
-def run_mapping(
+def run_clients(
     profile: Profile,
     mapping: Path,
     requests: int,
@@ -65,18 +65,12 @@ def add_board_and_clients(
     seed: int,
     on_round_trip: Callable[[str, RoundTrip], None],
 ) -> HostedBoard:
-    """Return the board of the experiment, with its five clients in the simulation; see `run_mapping`."""
+    """Return the board of the experiment, with its five clients in the simulation; see `run_clients`."""
     project = application()
     hosted = simulation.add_board(profile, project, project.mapping(str(mapping)), BoardOptions(seed=seed))
     for client in CLIENTS:
         options = ClientOptions(
-            client,
-            "",
-            requests,
-            limit_s=ANSWER_LIMIT_S,
-            seed=seed,
-            group="roundtrip",
-            members=len(CLIENTS),
+            client, requests, ANSWER_LIMIT_S, seed=seed, group="roundtrip", members=len(CLIENTS)
         )
         simulation.add_client(options, partial(on_round_trip, client))
     return hosted

@@ -121,7 +121,7 @@ def print_tables(console: Console, experiment: Mapping[str, Any]) -> None:
                 Text(str(cell["lost"]), style="red" if cell["lost"] else ""),
                 Text(str(cell["wrong"]), style="red" if cell["wrong"] else ""),
                 *(format_ms(cell[key]) for key in ("median_ms", "p95_ms", "p99_ms", "reference_median_ms")),
-                Text(format_error(cell["median_error"]), style=_STYLES[grade(cell["median_error"])]),
+                error_text(cell["median_error"]),
                 format_speedup(speedup),
             )
         table.add_section()
@@ -145,6 +145,11 @@ def error_note(requests: int) -> str:
         "For the error against the real board our times are taken modulo 1 s, as the paper's clients logged "
         "theirs. All other figures are whole round-trip times."
     )
+
+
+def error_text(error: float | None) -> Text:
+    """Return the relative error of a median for a terminal, in the colour of its grade."""
+    return Text(format_error(error), style=_STYLES[grade(error)])
 
 
 def grade(error: float | None) -> str:

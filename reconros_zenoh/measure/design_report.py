@@ -17,14 +17,15 @@ if TYPE_CHECKING:
 
 _TITLE = "One slot for two callbacks: the design example"
 _NAMES = {"one_slot": "one slot", "two_slots": "two slots"}
-_FIGURES = {
+FIGURES = {
     "reconfigurations": "reconfigurations",
-    "reconfiguration_ms": "time in them [ms]",
+    "reconfiguration_ms": "time in them",
     "frames_in": "pictures taken",
     "frames_out": "pictures filtered",
     "control_out": "servo indices",
     "wrong": "wrong",
 }
+"""What the figures of a variant are called; those that end in `_ms` are times in ms, the others counts."""
 
 Picture = tuple[str, bytes]
 """What a picture shows, and the bytes of its PNG file."""
@@ -66,6 +67,13 @@ def write_design_report(
         table(["what", "value"], [[key, str(experiment[key])] for key in shown_keys]),
     ]
     write_page(path, _TITLE, parts)
+
+
+def format_figure(key: str, value: float | None) -> str:
+    """Return a value of FIGURES as it is shown, `-` for None."""
+    if key.endswith("_ms"):
+        return format_ms(value)
+    return "-" if value is None else str(value)
 
 
 def _introduction(experiment: Mapping[str, Any]) -> str:
@@ -122,25 +130,20 @@ def _longer(cost_ms: float | None) -> str:
 def _table(variants: Mapping[str, Mapping[str, Any]]) -> str:
     rows = []
     for name, variant in variants.items():
-        counts = [
-            format_ms(variant[key]) if key.endswith("_ms") else _count(variant[key]) for key in _FIGURES
-        ]
+        figures = [format_figure(key, variant[key]) for key in FIGURES]
         times = [
             format_ms(variant[chain][point])
             for chain in ("filter_ms", "control_ms")
             for point in ("median", "p95")
         ]
-        rows.append([_NAMES[name], *counts, *times])
-    heads = [f"{chain}, {point}" for chain in ("picture", "servo index") for point in ("median", "p95")]
+        rows.append([_NAMES[name], *figures, *times])
+    heads = [f"{text} [ms]" if key.endswith("_ms") else text for key, text in FIGURES.items()]
+    heads += [f"{chain}, {point}" for chain in ("picture", "servo index") for point in ("median", "p95")]
     return (
-        table(["variant", *_FIGURES.values(), *heads], rows)
+        table(["variant", *heads], rows)
         + '<p class="small">Times of pictures are from the camera to the viewer, those of servo indices from '
         "their command to their publication, in ms.</p>"
     )
-
-
-def _count(value: int | None) -> str:
-    return "-" if value is None else str(value)
 
 
 def _slots(variants: Mapping[str, Mapping[str, Any]]) -> str:

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 INK = "#24292f"
 GREY = "#8b949e"
 _MAPPING_COLOURS = ("#d2691e", "#2f7ec4", "#2a9267", "#9463c0", "#c2485a", "#8a7a1f")
-_STAGE_COLOURS = {
+STAGE_COLOURS = {
     "transport": "#73757f",
     "dds": "#335ba3",
     "retransmission": "#ecc8da",
@@ -357,6 +357,6 @@ def _legend(figure: Figure, ours: str, behind: str | None, colours: Sequence[str
 def _stage_colours(stages: Iterable[str]) -> dict[str, str]:
     """Return a colour per stage, in the order of a message's way; stages of other names are grey and last."""
     found = dict.fromkeys(stages, GREY)
-    return {stage: colour for stage, colour in _STAGE_COLOURS.items() if stage in found} | {
-        stage: GREY for stage in found if stage not in _STAGE_COLOURS
+    return {stage: colour for stage, colour in STAGE_COLOURS.items() if stage in found} | {
+        stage: GREY for stage in found if stage not in STAGE_COLOURS
     }

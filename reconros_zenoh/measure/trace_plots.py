@@ -5,7 +5,7 @@ from __future__ import annotations
 from itertools import cycle
 from typing import TYPE_CHECKING
 
-from reconros_zenoh.measure.plots import GREY, drawing_style
+from reconros_zenoh.measure.plots import GREY, STAGE_COLOURS, drawing_style
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from reconros_zenoh.board.trace import Slice, Trace
 
 _DRAWN_NS = 1_000_000_000
-_RECONFIGURATION = "#a5453b"
+_RECONFIGURATION = STAGE_COLOURS["reconfiguration"]
 _WAYS = {"in": GREY, "out": "#c9ced6"}
 _HEIGHT = 0.72
 _LEGEND_LETTERS = 50  # of the callbacks in a row, beside the other keys

@@ -34,7 +34,6 @@ if TYPE_CHECKING:
     from reconros_zenoh.project.resource_groups import Resource
     from reconros_zenoh.rmw.node import Node
     from reconros_zenoh.ros.qos import QosProfile
-    from reconros_zenoh.ros.type_registry import TypeRegistry
 
 
 T = TypeVar("T")
@@ -51,13 +50,12 @@ class Application:
         project: Project,
         board: Board,
         mapping: ProjectMapping,
-        types: TypeRegistry,
         bitstreams: Path | None,
     ) -> None:
         self.project = project
         self.board = board
         self.mapping = mapping
-        self.types = types
+        self.types = project.types()
         self.bitstreams = bitstreams
         self.executor: Executor | None = None
         self._mapped: Executor | None = None

@@ -78,7 +78,7 @@ class HostedBoard:
             tap=options.tap,
             traced=traced or options.trace is not None,
         )
-        self._application = Application(project, self.board, mapping, project.types(), options.bitstreams)
+        self._application = Application(project, self.board, mapping, options.bitstreams)
         self.executor: Executor = project.start(self._application)
 
     def close(self) -> None:

@@ -8,7 +8,7 @@ from pydantic import BaseModel, ConfigDict, Field, StrictBool, StrictInt, Valida
 
 from reconros_zenoh.errors import FileError
 from reconros_zenoh.project.gateway_slots import gateway_slots
-from reconros_zenoh.toml_file import TomlFile
+from reconros_zenoh.toml_file import UNKNOWN_KEY, TomlFile, first_mistake
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping
@@ -16,7 +16,6 @@ if TYPE_CHECKING:
 
     from reconros_zenoh.project.build_cfg import BuildConfiguration, ReconosThread
 
-_UNKNOWN_KEY = "extra_forbidden"  # as pydantic calls it
 _Count = Annotated[StrictInt, Field(ge=0, le=1000)]
 
 
@@ -207,10 +206,9 @@ def _check_callback(
 
 
 def _schema_error(toml: TomlFile, error: ValidationError) -> FileError:
-    # A misspelt key is an unknown one and a missing one: the unknown one stands in the file.
-    first = min(error.errors(), key=lambda mistake: mistake["type"] != _UNKNOWN_KEY)
+    first = first_mistake(error)
     place = [str(key) for key in first["loc"]]
-    if first["type"] == _UNKNOWN_KEY:
+    if first["type"] == UNKNOWN_KEY:
         known = (
             CallbackMapping.model_fields if len(place) > 1 else ProjectMapping.model_fields.keys() - {"name"}
         )

@@ -162,7 +162,7 @@ class ActionServer:
         handle = GoalHandle(self, goal_id, request.goal, now_ns)
         with self._lock:
             response.accepted = goal_id not in self._goals and self._is_accepted(
-                request.goal, received.publisher.hex()
+                request.goal, received.publisher
             )
             if response.accepted:
                 self._goals[goal_id] = handle
@@ -172,7 +172,7 @@ class ActionServer:
             self._publish_status()
             self._on_goal(handle, received)
 
-    def _is_accepted(self, goal: object, sender: str) -> bool:
+    def _is_accepted(self, goal: object, sender: bytes) -> bool:
         try:
             self._accept(goal)
         except BadMessageError as error:

@@ -23,13 +23,13 @@ class Rejections:
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._counts: Counter[str] = Counter()
-        self._named: dict[str, set[str]] = {}
+        self._named: dict[str, set[bytes | str]] = {}
 
-    def add(self, key: str, sender: str | None, error: BadMessageError) -> None:
+    def add(self, key: str, sender: bytes | str | None, error: BadMessageError) -> None:
         """Count a refused message; log it when it is the first of its kind from this sender.
 
-        `sender` is the sender's gid in hexadecimal, or the name of the callback that published inside a slot;
-        None when the message does not tell.
+        `sender` is the sender's gid, or the name of the callback that published inside a slot; None when the
+        message does not tell.
         """
         with self._lock:
             self._counts[error.reason] += 1
@@ -38,10 +38,11 @@ class Rejections:
                 return
             named.add(sender or key)
             is_last = len(named) == _SENDERS_NAMED
+        name = sender.hex() if isinstance(sender, bytes) else sender
         _log.warning(
             "refused a message on %s from %s (%s); more of its kind are counted only%s",
             key,
-            f"publisher {sender}" if sender else "an unknown sender",
+            f"publisher {name}" if name else "an unknown sender",
             error,
             ", whoever sends them: no more senders are named" if is_last else "",
         )

@@ -83,5 +83,5 @@ class Service(Endpoint):
             self._refuse(request, None, self.foreign(request.key))
 
     def _refuse(self, request: Request, sender: bytes | None, error: BadMessageError) -> None:
-        self.context.rejections.add(request.key, sender.hex() if sender else None, error)
+        self.context.rejections.add(request.key, sender, error)
         request.reply_error(str(error))

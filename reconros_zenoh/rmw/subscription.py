@@ -54,7 +54,7 @@ class Subscription(Endpoint):
             if self._check is not None:
                 self._check(message)
         except BadMessageError as error:
-            self.context.rejections.add(key, sender.hex() if sender else None, error)
+            self.context.rejections.add(key, sender, error)
             return
         transit_ns = self.context.clock_ns() - source_timestamp_ns
         self._sink(Received(message, len(payload), transit_ns, None, sender))

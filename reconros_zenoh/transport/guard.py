@@ -41,10 +41,10 @@ class GuardedDeclaration(ABC):
     A subclass calls them through `call` and says in `withdraw` how it leaves the network.
     """
 
-    __slots__ = ("_has_failed", "_key", "is_closed", "lock")
+    __slots__ = ("_has_failed", "is_closed", "key", "lock")
 
     def __init__(self, key: str) -> None:
-        self._key = key
+        self.key = key
         self._has_failed = False
         self.is_closed = False
         self.lock = RLock()  # a callback may close its own declaration
@@ -62,12 +62,12 @@ class GuardedDeclaration(ABC):
         """Log the exception being handled, if it is the first."""
         if not self._has_failed:
             self._has_failed = True
-            _log.exception("a callback for %s failed; it is not reported again", self._key)
+            _log.exception("a callback for %s failed; it is not reported again", self.key)
 
     def check_open(self) -> None:
         """Raise TransportError when this is closed."""
         if self.is_closed:
-            raise TransportError(f"{self._key} is closed: nothing can be sent on it any more")
+            raise TransportError(f"{self.key} is closed: nothing can be sent on it any more")
 
     def close(self) -> None:
         """Leave the network; waits for a callback that runs on another thread. Idempotent."""

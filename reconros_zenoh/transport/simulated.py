@@ -1,6 +1,6 @@
 """A network without Zenoh: messages are events of the environment.
 
-What a link costs is not here: the board's network interface charges it.
+What a link costs is not here: the board's communication stack charges it.
 """
 
 from __future__ import annotations
@@ -119,11 +119,10 @@ _S = TypeVar("_S", bound="_Sender")
 class _Declaration(GuardedDeclaration):
     """Stands in the tables of its network and of its transport until it is closed."""
 
-    __slots__ = ("_mine", "key", "network")
+    __slots__ = ("_mine", "network")
 
     def __init__(self, home: _Home, key: str) -> None:
         super().__init__(key)
-        self.key = key
         self.network, self._mine = home
         self._mine[self] = None
 

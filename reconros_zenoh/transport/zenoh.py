@@ -225,7 +225,7 @@ class _Declaration(GuardedDeclaration):
         try:
             entity = declare(*arguments, **options)
         except zenoh.ZError as error:
-            raise _failure(f"{self._key} cannot be declared", error) from error
+            raise _failure(f"{self.key} cannot be declared", error) from error
         self._entities.append(entity)
         self._transport.declarations.add(self)
         return entity
@@ -287,7 +287,7 @@ class _Publisher(_Declaration):
         try:
             self._put(self._join(parts), attachment=attachment)
         except zenoh.ZError as error:
-            raise _failure(f"a message on {self._key} cannot be sent", error) from error
+            raise _failure(f"a message on {self.key} cannot be sent", error) from error
 
     def withdraw(self) -> None:
         self._put = self._refuse
@@ -358,7 +358,7 @@ class _Querier(_Declaration):
                 attachment=attachment,
             )
         except zenoh.ZError as error:
-            raise _failure(f"a request on {self._key} cannot be sent", error) from error
+            raise _failure(f"a request on {self.key} cannot be sent", error) from error
 
     def _take(self, on_reply: OnReply, reply: zenoh.Reply) -> None:
         if (sample := reply.ok) is not None:

@@ -386,7 +386,7 @@ def test_a_check_that_fails_itself_refuses_the_message_and_harms_nobody(
             publisher.publish(a_message(value))
         else:
             timeline = Timeline(board.environment, board.environment.now)
-            start(board.environment, writer.publish(a_message(value), board.osif, timeline))
+            start(board.environment, writer.publish(a_message(value), timeline))
     board.environment.run(until=100_000)
     assert heard == {"picky": [1], "patient": [0, 0, 0, 1]}
     assert board.context.rejections.counts() == {"check_failed": 3}

@@ -86,7 +86,7 @@ class Setup:
         body = words.cls(layout=layout, data=np.zeros(U, np.uint8) if data is None else data)
         timeline = Timeline(self.environment, self.environment.now)
         if hardware:
-            Activity(self.writer.publish(body, self.board.osif, timeline))
+            Activity(self.writer.publish(body, timeline))
         else:
             self.writer.send(self.writer.encode(body), timeline)
         self.environment.run()
@@ -252,7 +252,7 @@ class Late:
         body = words.cls(layout=layout, data=np.full(U, number, np.uint8))
         timeline = Timeline(self.environment, self.environment.now)
         if self.from_hardware:
-            Activity(self.writer.publish(body, self.board.osif, timeline))
+            Activity(self.writer.publish(body, timeline))
         else:
             self.writer.send(self.writer.encode(body), timeline)
 

@@ -6,7 +6,7 @@ import re
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import pytest
-from small_board import start, types
+from small_board import start
 
 from host_clients.suite import exchange
 from reconros_zenoh.board.board import Board
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from small_board import Steps
 
     from reconros_zenoh.project.loader import Project
-    from reconros_zenoh.ros.type_registry import TypeRegistry
 
 MAPPINGS = ("all_software", "mixed", "all_hardware")
 PERIOD_NS = 250_000_000
@@ -36,14 +35,6 @@ def project() -> Project:
     return load_project(application_folder())
 
 
-@pytest.fixture(scope="module")
-def registry(project: Project) -> TypeRegistry:
-    registry = types()
-    for name, text in project.interfaces.texts.items():
-        registry.add_service(name, text)
-    return registry
-
-
 class Seen(NamedTuple):
     """What a client that runs alone saw, and what the board accounts for it [ns per message]."""
 
@@ -51,13 +42,13 @@ class Seen(NamedTuple):
     stages_ns: dict[str, float]
 
 
-def run_alone(project: Project, registry: TypeRegistry, mapping: str, client: str, trips: int) -> Seen:
+def run_alone(project: Project, mapping: str, client: str, trips: int) -> Seen:
     """Run one client against the application, nobody else, and let it make some round trips."""
     environment = VirtualEnvironment()
     network = SimulatedNetwork(environment)
     context = Context(network.transport("b0"), 0, environment.clock_ns)
     board = Board(environment, context, read_profile("miniitx-zynq7100"), project.slots)
-    project.main(Application(project, board, project.mapping(mapping), registry, None))
+    project.main(Application(project, board, project.mapping(mapping), None))
 
     asking = exchange(client, seed=1)
     answers: list[tuple[int, Any]] = []
@@ -69,7 +60,7 @@ def run_alone(project: Project, registry: TypeRegistry, mapping: str, client: st
         arrived[0] = environment.event()
 
     node = Context(network.transport("c0"), 0, environment.clock_ns).node("client")
-    asking.open(node, registry, arrive, lambda _: None)
+    asking.open(node, project.types(), arrive, lambda _: None)
 
     trips_ns: list[int] = []
 
@@ -90,21 +81,19 @@ def run_alone(project: Project, registry: TypeRegistry, mapping: str, client: st
 
 @pytest.mark.parametrize("mapping", MAPPINGS)
 @pytest.mark.parametrize("client", CLIENTS)
-def test_the_spans_of_a_client_alone_are_its_round_trips(
-    project: Project, registry: TypeRegistry, mapping: str, client: str
-) -> None:
-    seen = run_alone(project, registry, mapping, client, trips=5)
+def test_the_spans_of_a_client_alone_are_its_round_trips(project: Project, mapping: str, client: str) -> None:
+    seen = run_alone(project, mapping, client, trips=5)
     # Means of whole nanoseconds, in floats.
     assert sum(seen.stages_ns.values()) * 5 == pytest.approx(sum(seen.trips_ns), abs=1e-3)
 
 
 @pytest.mark.parametrize("client", CLIENTS)
 def test_in_hardware_the_time_from_start_to_completion_is_what_the_profile_says(
-    project: Project, registry: TypeRegistry, client: str
+    project: Project, client: str
 ) -> None:
     """Table I gives the whole time; the profile keeps of it what the slot computes."""
     # Only one trip: later ones share the memory with the hash calculation.
-    seen = run_alone(project, registry, "all_hardware", client, trips=1)
+    seen = run_alone(project, "all_hardware", client, trips=1)
     model = read_profile("miniitx-zynq7100").model
     assert model is not None
     source = model.callbacks[client].compute.source

@@ -257,10 +257,10 @@ def test_a_slot_is_reconfigured_if_and_only_if_it_holds_another_bitstream(
     ran: list[tuple[int, str]] = []  # slot and callback of each dispatch, in order
     select = board.executor.select
 
-    def noting(worker: Any, resource: int) -> Any:
-        dispatch = select(worker, resource)
+    def noting(worker: Any) -> Any:
+        dispatch = select(worker)
         if dispatch is not None:
-            ran.append((resource, dispatch.entry.name))
+            ran.append((worker.resource, dispatch.entry.name))
         return dispatch
 
     board.executor.select = noting  # type: ignore[method-assign] # listens only

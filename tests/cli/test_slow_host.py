@@ -7,13 +7,14 @@ import io
 from rich.console import Console
 
 from reconros_zenoh.cli import design, gateway_experiment
+from reconros_zenoh.measure.design_report import FIGURES
 
 LATE = "Once a computation took longer on this computer than the board is modelled to need."
 
 
 def test_the_design_example_tells_it_of_each_variant() -> None:
     times_ms = {"median": 1.0, "p95": 2.0}
-    variant = {**dict.fromkeys(design._ROWS, 1), "filter_ms": times_ms, "control_ms": times_ms}
+    variant = {**dict.fromkeys(FIGURES, 1), "filter_ms": times_ms, "control_ms": times_ms}
     hosts = {name: {"overruns": count, "lag_p99_us": 90.0} for name, count in {"one": 1, "two": 0}.items()}
     stream = io.StringIO()
     design._print_table(

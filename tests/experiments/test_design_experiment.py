@@ -292,7 +292,7 @@ def test_the_scope_and_the_viewer_tell_lost_and_wrong_from_right() -> None:
 def test_a_camera_that_nobody_looks_at_says_so() -> None:
     types = load_project(projects_folder() / "vision").types()
     with Simulation(types) as simulation:
-        camera = simulation.add_camera(CameraOptions("", 5, wait_s=3))
+        camera = simulation.add_camera(CameraOptions(5, wait_s=3))
         with pytest.raises(TransportError, match="nobody in domain 0 subscribed to /image_raw within 3 s"):
             simulation.run()
     assert camera.sent == 0
@@ -307,7 +307,7 @@ def test_a_camera_waits_for_the_others_of_its_group() -> None:
             "/image_raw",
             lambda _: began_ns.append(simulation.environment.now),
         )
-        simulation.add_camera(CameraOptions("", 1, group="g", members=2))
+        simulation.add_camera(CameraOptions(1, group="g", members=2))
         simulation.environment.call_later(
             1_000_000_000, lambda: simulation.add_viewer(0, [].append, [].append, group="g")
         )

@@ -121,7 +121,7 @@ def test_the_map_finds_in_each_picture_what_was_in_the_one_before() -> None:
             "/matches",
             lambda received: matches.append(received.message.data),
         )
-        simulation.add_robot(RobotOptions("", 5), lambda _: None)
+        simulation.add_robot(RobotOptions(5), lambda _: None)
         simulation.run()
     first, *others = matches
     assert first == 0
@@ -264,7 +264,7 @@ def test_no_message_that_the_nodes_cannot_use_comes_to_them() -> None:
         ):
             publisher = foreign.publisher(types.message(kind), topic)
             simulation.environment.call_later(1_000_000, publisher.publish, message)
-        robot = simulation.add_robot(RobotOptions("", 30), lambda _: None)
+        robot = simulation.add_robot(RobotOptions(30), lambda _: None)
         simulation.run()
     statistics = hosted.executor.statistics()
     assert {name: one["failed"] for name, one in statistics.items()} == dict.fromkeys(statistics, 0)
@@ -315,9 +315,9 @@ def test_each_detection_tells_once_and_watches_again_when_the_other_has_told() -
 
 def test_a_robot_that_comes_when_the_last_one_stood_at_the_light_drives() -> None:
     with board() as (simulation, *_):
-        first = simulation.add_robot(RobotOptions("", 30), lambda _: None)
+        first = simulation.add_robot(RobotOptions(30), lambda _: None)
         simulation.run()
-        second = simulation.add_robot(RobotOptions("", 30), lambda _: None)
+        second = simulation.add_robot(RobotOptions(30), lambda _: None)
         simulation.run()
     assert first.steps[-1].speed == 0
     assert second.steps[10].speed > 0
@@ -357,7 +357,7 @@ def test_a_picture_of_another_size_is_refused() -> None:
 
 def test_a_robot_that_nobody_drives_gives_up() -> None:
     with Simulation(TypeRegistry()) as simulation:
-        simulation.add_robot(RobotOptions("", 1, wait_s=0.5), lambda _: None)
+        simulation.add_robot(RobotOptions(1, wait_s=0.5), lambda _: None)
         with pytest.raises(TransportError, match="nobody in domain 0 subscribed to /image_raw"):
             simulation.run()
 

@@ -263,7 +263,7 @@ def first_sort_ns(group: str | None) -> int:
             "hash": lambda _: None,
         }
         for name, record in recorders.items():
-            simulation.add_client(ClientOptions(name, "", 1, group=group, members=2), record)
+            simulation.add_client(ClientOptions(name, 1, group=group, members=2), record)
         simulation.run()
     assert len(done_ns) == 1
     return done_ns[0]

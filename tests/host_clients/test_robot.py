@@ -28,7 +28,7 @@ class Drive:
         )
         self.trips: list[RoundTrip] = []
         self.robot = DrivingRobot(
-            self.environment, self.here, types, RobotOptions("", pictures), self.trips.append
+            self.environment, self.here, types, RobotOptions(pictures), self.trips.append
         )
         twist, vector, header = (
             types.message(name).cls
