@@ -13,6 +13,7 @@ from reconros_zenoh.cli.experiment import MAPPINGS, plan, run, show
 from reconros_zenoh.cli.options import ClockName, Out
 from reconros_zenoh.cli.progress import run_bar
 from reconros_zenoh.experiments.ablation import ablate, runs_of_ablation
+from reconros_zenoh.experiments.interruption import until_interrupted
 from reconros_zenoh.experiments.roundtrip import all_right
 from reconros_zenoh.measure.report import write_report
 from reconros_zenoh.measure.run import load_run
@@ -29,22 +30,33 @@ def demo(
     """Run the round-trip experiment in both clocks; write a report.
 
     First in wall time, then in virtual time. The report also says what each mechanism of the board model is
-    worth: runs in virtual time without it.
+    worth: runs in virtual time without it. Ctrl-C ends it with a report of what was measured.
     """
     console = wide_console()
     runs = []
+    ablation = None
     for clock, requests in ((ClockName.WALL, wall_requests), (ClockName.VIRTUAL, virtual_requests)):
         planned = plan(clock, MAPPINGS, requests, 0, out, _PROFILE)
         experiment = run(planned, quiet=False)
         show(console, experiment)
-        if experiment["interrupted"]:
-            print(f"records and experiment.json are in {planned.folder}")
-            raise interrupted(quiet=False, measured=bool(experiment["mappings"]))
-        runs.append(load_run(planned.folder))
-    with run_bar("what each mechanism is worth", runs_of_ablation(planned.mappings), quiet=False) as advance:
-        ablation = ablate(read_profile(_PROFILE), planned.mappings, _ABLATION_REQUESTS, advance)
+        if experiment["mappings"]:
+            runs.append(load_run(planned.folder))
+        if ended := experiment["interrupted"]:
+            break
+    else:
+        total = runs_of_ablation(planned.mappings)
+        with (
+            run_bar("what each mechanism is worth", total, quiet=False) as advance,
+            until_interrupted() as interruption,
+        ):
+            ablation = ablate(read_profile(_PROFILE), planned.mappings, _ABLATION_REQUESTS, advance)
+        ended = interruption.happened
+    if not runs:
+        raise interrupted(quiet=False, measured=False)
     experiments, records = zip(*runs, strict=True)
     report = out / "report.html"
     write_report(report, experiments, records, ablation)
     print(f"report: {report}")
+    if ended:
+        raise interrupted(quiet=False)
     raise typer.Exit(0 if all(map(all_right, experiments)) else 1)

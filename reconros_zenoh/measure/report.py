@@ -97,6 +97,8 @@ def _section(experiment: Mapping[str, Any], records: Mapping[str, Mapping[str, R
         return [*parts, "<p>Nothing was measured.</p>"]
     if clock := _CLOCKS.get(experiment["clock"]):
         parts.append(f"<p>{clock}</p>")
+    if experiment.get("interrupted"):
+        parts.append('<p class="warning">The run was interrupted: its last mapping ended early.</p>')
     if experiment["clock"] == "wall" and (troubles := host_troubles(experiment["host"])):
         parts.append(
             '<p class="warning"><b>These figures are partly the host\'s.</b> '
