@@ -61,9 +61,9 @@ def calibrate(
             help="Leave out each file's first and last value: warm-up and total in the paper's logs.",
         ),
     ] = False,
-    evaluations: Annotated[
-        int, typer.Option(min=2, help="Evaluations of the search, each three runs per mapping.")
-    ] = 200,
+    rounds: Annotated[
+        int, typer.Option(min=1, help="Rounds of the search; each tries all constants up and down.")
+    ] = 5,
     requests: Annotated[
         int, typer.Option(min=20, help="Requests per client and run; more lower the noise.")
     ] = 300,
@@ -80,12 +80,12 @@ def calibrate(
     project = application()
     measured = read_measurements([*data, *(more_data or [])], project, _assignments(mapping or []), trim=trim)
     with replacing(out) as file:
-        total = planned_evaluations(constants, evaluations)
+        total = planned_evaluations(constants, rounds)
         with (
             run_bar(f"fitting {len(constants)} constants", total, quiet=as_json) as advance,
             until_interrupted() as interruption,
         ):
-            found = fit(start, measured, evaluations, requests, seed, advance)
+            found = fit(start, measured, rounds, requests, seed, advance)
         if interruption.happened:
             raise interrupted(quiet=as_json, measured=False)
         values = {
@@ -166,7 +166,10 @@ def _print(console: Console, found: Calibration) -> None:
             ),
         )
     console.print(cells)
-    title = "Constants, and how much the objective changes when one is 20 % more or less"
+    title = (
+        "Constants. Sensitivity: how much quartiles change between 20 % more and 20 % less, as a multiple "
+        "of their change from seed to seed"
+    )
     constants = new_table(("constant", "unit"), ("old", "new", "sensitivity"), title=title)
     constants.add_column("")
     for each in found.constants:
@@ -175,7 +178,7 @@ def _print(console: Console, found: Calibration) -> None:
             each.constant.unit,
             f"{each.constant.value:.4g}",
             f"{each.value:.4g}",
-            "-" if each.sensitivity is None else f"{each.sensitivity:.3f}",
+            "-" if each.sensitivity is None else f"{each.sensitivity:.2g}",
             Text("not determined", style="yellow") if each.determined is False else "",
         )
     console.print(constants)
@@ -188,8 +191,8 @@ def _print(console: Console, found: Calibration) -> None:
         console.print(
             Text(
                 f"warning: the data do not determine {', '.join(vague)}: 20 % more or less changes the "
-                "objective by less than the seed does. More --requests or other mappings may tell; otherwise "
-                "mark them assumed.",
+                "quartiles hardly more than the seed does. More --requests or other mappings may tell; "
+                "otherwise mark them assumed.",
                 style="yellow",
             )
         )

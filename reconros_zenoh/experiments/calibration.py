@@ -1,16 +1,16 @@
 """Fitting the calibrated constants of a board profile to measured round trips.
 
-Published and assumed constants are held. The objective is the sum of |log(ours / measured)| over the
-quartiles of all cells (mapping and client). It is found by simulation, so it is neither smooth nor without
-noise: the search uses no derivatives, the same seeds all along, and takes a step only if it gains more than
-the objective differs between other seeds.
+Published and assumed constants are held. The residuals are log(ours / measured) of the quartiles of all cells
+(mapping and client), the objective is the sum of their absolute values. They are found by simulation, so they
+are neither smooth nor without noise: derivatives are taken over wide steps and with the same seeds, what they
+promise is judged with others, and the figures before and after are of seeds that the search never used.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 import numpy as np
 from pydantic import BaseModel
@@ -32,14 +32,25 @@ if TYPE_CHECKING:
     from reconros_zenoh.measure.record import Record
 
 SAMPLES = 4
-"""Evaluations with seeds of their own that give the noise and the figures before and after; the search goes
-on with the seeds of the first."""
+"""Evaluations with seeds of their own that give the noise and the figures before and after."""
 
 _SEEDS = 3  # per evaluation: a board can lock into another pattern from another start
 
+# Steps are differences of logarithms: 0.2 is a fifth more, or less.
 _FIRST_STEP = 0.2
 _LAST_STEP = 0.02
+_LARGEST_STEP = math.log(2)
 _SENSITIVITY_STEP = 0.2
+_CLEARLY = 2.0
+# How much of the way that the derivatives promise is tried, and with how many seeds of their own.
+_FRACTIONS = (1.0, 0.5, 0.25)
+_JUDGES = 2
+# How much a constant is held at its first value, beside what residuals ask for.
+_PULL = 0.3
+_REWEIGHTINGS = 10
+_SMALL_RESIDUAL = 0.02
+# Quartiles can be the same for some seeds: no change below half a per cent is taken for more than noise.
+_LEAST_NOISE = 0.005
 # Where a message is resent with certainty it never arrives.
 _LARGEST_PROBABILITY = 0.9
 # A client that gets no answer at all counts like one whose answers come at its limit.
@@ -66,15 +77,19 @@ class Constant:
 class FittedConstant:
     """A constant and what became of it.
 
-    `sensitivity` is the most that the objective changes when the constant is 20 % more or less. Data that
-    change it no more than the seeds do leave the constant undetermined. Both are None when the calibration
-    was interrupted before.
+    `sensitivity` is how much the quartiles change when the constant is 20 % more instead of less, as a
+    multiple of what they change from seed to seed (root mean square of all). Where it is not clearly above 1
+    the data leave the constant undetermined. Both are None when the calibration was interrupted before.
     """
 
     constant: Constant
     value: float
     sensitivity: float | None
-    determined: bool | None
+
+    @property
+    def determined(self) -> bool | None:
+        """Whether the measurements determine the constant."""
+        return None if self.sensitivity is None else self.sensitivity > _CLEARLY
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,10 +118,19 @@ class Calibration:
 
 
 class _Evaluation(NamedTuple):
-    """The quartiles of all cells for one set of values and one set of seeds, and the objective."""
+    """The quartiles of all cells for one set of values and one set of seeds, and all their residuals."""
 
     cells: dict[tuple[str, str], npt.NDArray[np.float64]]
-    objective: float
+    residuals: npt.NDArray[np.float64]
+
+    @property
+    def objective(self) -> float:
+        """The sum of the absolute values of the residuals."""
+        return float(np.abs(self.residuals).sum())
+
+
+_Evaluate: TypeAlias = "Callable[[Sequence[tuple[Sequence[float], int]]], list[_Evaluation]]"
+"""Returns an evaluation for each pair of values and a number that chooses the seeds."""
 
 
 def calibrated_constants(profile: Profile) -> list[Constant]:
@@ -124,25 +148,23 @@ def calibrated_constants(profile: Profile) -> list[Constant]:
     return constants
 
 
-def planned_evaluations(constants: Sequence[Constant], evaluations: int) -> int:
-    """Return how many evaluations a calibration takes at most, `evaluations` of them for the search."""
-    return evaluations + 2 * SAMPLES + 2 * len(constants)
+def planned_evaluations(constants: Sequence[Constant], rounds: int) -> int:
+    """Return how many evaluations a calibration with so many rounds takes at most."""
+    return rounds * (2 * len(constants) + _JUDGES * (1 + len(_FRACTIONS))) + 2 * SAMPLES + 2 * len(constants)
 
 
 def calibrate(
     profile: Profile,
     measured: Sequence[MeasuredMapping],
-    evaluations: int,
+    rounds: int,
     requests: int,
     seed: int,
     on_evaluation: Callable[[], None],
 ) -> Calibration:
-    """Return the profile fitted to what was measured; the same arguments give the same result anywhere.
+    """Return the profile fitted to what was measured; the same arguments give the same result.
 
-    A pattern search along one constant after the other, in steps of its logarithm: it tries a step up and a
-    step down, doubles the step where that helped and halves it where it did not, and ends after that many
-    `evaluations` or when all steps are below 2 %. `on_evaluation` is called after each evaluation (three
-    runs of different seeds under each measured mapping).
+    At most so many `rounds` of damped Gauss-Newton steps, see `_Search`. `on_evaluation` is called after each
+    evaluation (three runs of different seeds under each measured mapping).
 
     Ctrl-C ends the search with the best values so far; before it has begun it raises KeyboardInterrupt.
     """
@@ -166,27 +188,26 @@ def calibrate(
 
         start = [constant.value for constant in constants]
         before = evaluate([(start, each) for each in range(SAMPLES)])
-        noise = float(np.std([each.objective for each in before], ddof=1))
-        search = _Search(constants, noise, start, before[0])
+        search = _Search(constants, start, before)
         after: list[_Evaluation] = []
         around: list[_Evaluation] = []
         with until_interrupted() as interruption:
-            search.run(evaluations, evaluate)
+            search.run(rounds, evaluate)
             after = evaluate([(search.values, each) for each in range(SAMPLES)])
             around = evaluate(
                 [
-                    (_moved(constants, search.values, index, factor), 0)
-                    for index in range(len(constants))
-                    for factor in (1 + _SENSITIVITY_STEP, 1 - _SENSITIVITY_STEP)
+                    (_moved(constants, search.values, step), 0)
+                    for one in np.eye(len(constants))
+                    for step in (_SENSITIVITY_STEP * one, -_SENSITIVITY_STEP * one)
                 ]
             )
-    after = after or [search.best]
-    changes = [abs(each.objective - search.best.objective) for each in around]
-    sensitivities = [max(changes[2 * index : 2 * index + 2], default=None) for index in range(len(constants))]
+    after = after or search.best
+    variances = [np.var([each.objective for each in some], ddof=1) for some in (before, after)]
+    sensitivities = _sensitivities(around, before, after) if around else [None] * len(constants)
     return Calibration(
         profile=_profile(profile, constants, search.values),
         constants=tuple(
-            FittedConstant(constant, value, sensitivity, None if sensitivity is None else sensitivity > noise)
+            FittedConstant(constant, value, sensitivity)
             for constant, value, sensitivity in zip(constants, search.values, sensitivities, strict=True)
         ),
         cells=tuple(
@@ -202,7 +223,7 @@ def calibrate(
         ),
         before=float(np.mean([each.objective for each in before])),
         after=float(np.mean([each.objective for each in after])),
-        noise=noise,
+        noise=math.sqrt(np.mean(variances)),
         evaluations=search.used + len(before) + len(after) + len(around),
         interrupted=interruption.happened,
     )
@@ -210,36 +231,77 @@ def calibrate(
 
 @dataclass(slots=True)
 class _Search:
-    """The best values so far, what came of them, and how many evaluations it took to find them."""
+    """The best values so far, and what came of them with some seeds.
+
+    A round takes the derivatives of all residuals by the logarithm of each constant, from a step up and a
+    step down; finds the way to the least sum of absolute residuals, if they were linear; and goes all of it,
+    a half or a quarter, whichever is best with other seeds. Where none of them is better than to stay, the
+    next round's steps are half as wide.
+    """
 
     constants: Sequence[Constant]
-    noise: float
     values: list[float]
-    best: _Evaluation
+    best: list[_Evaluation]
     used: int = 0
 
-    def run(
-        self,
-        evaluations: int,
-        evaluate: Callable[[Sequence[tuple[Sequence[float], int]]], list[_Evaluation]],
-    ) -> None:
-        """Search until so many evaluations are used or all steps are small."""
-        steps = [_FIRST_STEP] * len(self.constants)
-        while self.used + 2 <= evaluations and max(steps) >= _LAST_STEP:
-            for index, step in enumerate(steps):
-                if step < _LAST_STEP or self.used + 2 > evaluations:
-                    continue
-                tried = [
-                    _moved(self.constants, self.values, index, math.exp(signed)) for signed in (step, -step)
-                ]
-                found = evaluate([(point, 0) for point in tried])
-                self.used += len(tried)
-                least, values = min(zip(found, tried, strict=True), key=lambda each: each[0].objective)
-                if least.objective < self.best.objective - self.noise:
-                    self.values, self.best = values, least
-                    steps[index] *= 2
-                else:
-                    steps[index] /= 2
+    def run(self, rounds: int, evaluate: _Evaluate) -> None:
+        """Search for so many rounds, or until the steps are small."""
+        first, step, sample = list(self.values), _FIRST_STEP, SAMPLES
+        for _ in range(rounds):
+            if step < _LAST_STEP:
+                break
+            way = self._way(first, step, sample, evaluate)
+            tried = [self.values, *(_moved(self.constants, self.values, part * way) for part in _FRACTIONS)]
+            judges = range(sample + 1, sample + 1 + _JUDGES)
+            found = evaluate([(point, each) for point in tried for each in judges])
+            self.used += len(found)
+            judged = [found[index * _JUDGES : (index + 1) * _JUDGES] for index in range(len(tried))]
+            least = min(range(len(tried)), key=lambda index: sum(each.objective for each in judged[index]))
+            self.values, self.best = tried[least], judged[least]
+            if least == 0:
+                step /= 2
+            sample = judges.stop
+
+    def _way(
+        self, first: Sequence[float], step: float, sample: int, evaluate: _Evaluate
+    ) -> npt.NDArray[np.float64]:
+        """Return by how much to change the logarithm of each constant."""
+        steps = step * np.eye(len(self.values))
+        points = [_moved(self.constants, self.values, each) for one in steps for each in (one, -one)]
+        found = evaluate([(point, sample) for point in points])
+        self.used += len(found)
+        residuals = np.array([each.residuals for each in found])
+        logs = np.log(points)
+        widths = np.diagonal(logs[0::2] - logs[1::2])
+        derivatives = ((residuals[0::2] - residuals[1::2]) / widths[:, np.newaxis]).T
+        # Of points on both sides the mean is what would be found between them, with less noise.
+        return _least_deviations(residuals.mean(axis=0), derivatives, np.log(first) - np.log(self.values))
+
+
+def _least_deviations(
+    residuals: npt.NDArray[np.float64], derivatives: npt.NDArray[np.float64], home: npt.NDArray[np.float64]
+) -> npt.NDArray[np.float64]:
+    """Return the step with the least sum of |residuals + derivatives @ step|, pulled to the step `home`.
+
+    Iteratively reweighted least squares. The pull keeps where it was what the residuals do not determine.
+    """
+    weights = np.ones(residuals.size)
+    pull = _PULL * np.eye(home.size)
+    for _ in range(_REWEIGHTINGS):
+        matrix = np.vstack([derivatives * weights[:, np.newaxis], pull])
+        step = np.linalg.lstsq(matrix, np.concatenate([-residuals * weights, pull @ home]), rcond=None)[0]
+        weights = 1 / np.sqrt(np.abs(residuals + derivatives @ step) + _SMALL_RESIDUAL)
+    clipped: npt.NDArray[np.float64] = np.clip(step, -_LARGEST_STEP, _LARGEST_STEP)
+    return clipped
+
+
+def _sensitivities(around: Sequence[_Evaluation], *samples: Sequence[_Evaluation]) -> list[float]:
+    """Return the sensitivity to each constant from evaluations of two sides each, with the same seeds."""
+    residuals = np.array([each.residuals for each in around])
+    changes = residuals[0::2] - residuals[1::2]
+    spreads = [np.var([each.residuals for each in some], axis=0, ddof=1) for some in samples]
+    noise = np.maximum(np.sqrt(np.mean(spreads, axis=0)), _LEAST_NOISE)
+    return [float(each) for each in np.sqrt(np.mean((changes / noise) ** 2, axis=1))]
 
 
 def _constants(part: object, place: tuple[str, ...]) -> Iterator[Constant]:
@@ -268,11 +330,14 @@ def _most(quantity: Quantity) -> float:
             return math.inf
 
 
-def _moved(constants: Sequence[Constant], values: Sequence[float], index: int, factor: float) -> list[float]:
-    """Return the values with one of them times the factor, with the four digits that the file will show."""
-    moved = list(values)
-    moved[index] = float(f"{min(constants[index].most, values[index] * factor):.4g}")
-    return moved
+def _moved(
+    constants: Sequence[Constant], values: Sequence[float], step: npt.NDArray[np.float64]
+) -> list[float]:
+    """Return the values with their logarithms changed, with the four digits that the file will show."""
+    return [
+        float(f"{min(constant.most, value * math.exp(change)):.4g}") if change else value
+        for constant, value, change in zip(constants, values, step, strict=True)
+    ]
 
 
 def _profile(profile: Profile, constants: Sequence[Constant], values: Sequence[float]) -> Profile:
@@ -281,15 +346,15 @@ def _profile(profile: Profile, constants: Sequence[Constant], values: Sequence[f
 
 def _compare(measured: Sequence[MeasuredMapping], records: Sequence[Mapping[str, Record]]) -> _Evaluation:
     cells = {}
-    objective = 0.0
+    residuals = []
     for mapping, clients in zip(measured, records, strict=True):
         for client, real in mapping.quartiles_ms.items():
             values_ms = clients[client].values_ms
             ours = quartiles_ms(values_ms) if values_ms.size else np.full(real.shape, _NO_ANSWER_MS)
             cells[mapping.name, client] = ours
             # A time may be a whole number of seconds, which is 0 modulo 1 s.
-            objective += float(np.abs(np.log(np.maximum(ours, _LEAST_MS) / real)).sum())
-    return _Evaluation(cells, objective)
+            residuals.append(np.log(np.maximum(ours, _LEAST_MS) / real))
+    return _Evaluation(cells, np.concatenate(residuals))
 
 
 def _mean_quartiles(evaluations: Sequence[_Evaluation], cell: tuple[str, str]) -> tuple[float, ...]:

@@ -38,7 +38,7 @@ SHORTER = {
     "experiment driving": ("--pictures", "20"),
     "experiment gateway": ("--repeat", "1", "--sizes", "10kB", "--subscribers", "2"),
     "simulate -f deploy/roundtrip.yaml": ("--requests", "1", "--boards", "2"),
-    "calibrate": ("--evaluations", "2", "--requests", "20"),
+    "calibrate": ("--rounds", "1", "--requests", "20"),
     "run blink --clock virtual": ("--seconds", "1"),
 }
 LISTENERS = {
