@@ -45,8 +45,8 @@ _CLEARLY = 2.0
 # How much of the way that the derivatives promise is tried, and with how many seeds of their own.
 _FRACTIONS = (1.0, 0.5, 0.25)
 _JUDGES = 2
-# How much a constant is held at its first value, beside what residuals ask for.
-_PULL = 0.3
+# How much each constant is held where it is, beside what the residuals ask for.
+_DAMPING = 1.0
 _REWEIGHTINGS = 10
 _SMALL_RESIDUAL = 0.02
 # Quartiles can be the same for some seeds: no change below half a per cent is taken for more than noise.
@@ -246,11 +246,11 @@ class _Search:
 
     def run(self, rounds: int, evaluate: _Evaluate) -> None:
         """Search for so many rounds, or until the steps are small."""
-        first, step, sample = list(self.values), _FIRST_STEP, SAMPLES
+        step, sample = _FIRST_STEP, SAMPLES
         for _ in range(rounds):
             if step < _LAST_STEP:
                 break
-            way = self._way(first, step, sample, evaluate)
+            way = self._way(step, sample, evaluate)
             tried = [self.values, *(_moved(self.constants, self.values, part * way) for part in _FRACTIONS)]
             judges = range(sample + 1, sample + 1 + _JUDGES)
             found = evaluate([(point, each) for point in tried for each in judges])
@@ -262,9 +262,7 @@ class _Search:
                 step /= 2
             sample = judges.stop
 
-    def _way(
-        self, first: Sequence[float], step: float, sample: int, evaluate: _Evaluate
-    ) -> npt.NDArray[np.float64]:
+    def _way(self, step: float, sample: int, evaluate: _Evaluate) -> npt.NDArray[np.float64]:
         """Return by how much to change the logarithm of each constant."""
         steps = step * np.eye(len(self.values))
         points = [_moved(self.constants, self.values, each) for one in steps for each in (one, -one)]
@@ -275,21 +273,22 @@ class _Search:
         widths = np.diagonal(logs[0::2] - logs[1::2])
         derivatives = ((residuals[0::2] - residuals[1::2]) / widths[:, np.newaxis]).T
         # Of points on both sides the mean is what would be found between them, with less noise.
-        return _least_deviations(residuals.mean(axis=0), derivatives, np.log(first) - np.log(self.values))
+        return _least_deviations(residuals.mean(axis=0), derivatives)
 
 
 def _least_deviations(
-    residuals: npt.NDArray[np.float64], derivatives: npt.NDArray[np.float64], home: npt.NDArray[np.float64]
+    residuals: npt.NDArray[np.float64], derivatives: npt.NDArray[np.float64]
 ) -> npt.NDArray[np.float64]:
-    """Return the step with the least sum of |residuals + derivatives @ step|, pulled to the step `home`.
+    """Return the step with the least sum of |residuals + derivatives @ step|, damped.
 
-    Iteratively reweighted least squares. The pull keeps where it was what the residuals do not determine.
+    Iteratively reweighted least squares. What the residuals do not determine hardly moves.
     """
     weights = np.ones(residuals.size)
-    pull = _PULL * np.eye(home.size)
+    damping = _DAMPING * np.eye(derivatives.shape[1])
     for _ in range(_REWEIGHTINGS):
-        matrix = np.vstack([derivatives * weights[:, np.newaxis], pull])
-        step = np.linalg.lstsq(matrix, np.concatenate([-residuals * weights, pull @ home]), rcond=None)[0]
+        matrix = np.vstack([derivatives * weights[:, np.newaxis], damping])
+        target = np.concatenate([-residuals * weights, np.zeros(len(damping))])
+        step = np.linalg.lstsq(matrix, target, rcond=None)[0]
         weights = 1 / np.sqrt(np.abs(residuals + derivatives @ step) + _SMALL_RESIDUAL)
     clipped: npt.NDArray[np.float64] = np.clip(step, -_LARGEST_STEP, _LARGEST_STEP)
     return clipped
