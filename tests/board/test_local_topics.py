@@ -133,7 +133,7 @@ def test_what_a_hardware_callback_publishes_keeps_it_in_the_stage_of_topics() ->
     setup = Setup(1)
     timeline = Timeline(setup.environment, setup.environment.now)
     body = words.cls(layout=layout, data=np.zeros(U, np.uint8))
-    Activity(setup.writer.publish(body, setup.board.osif, timeline))
+    Activity(setup.writer.publish(body, timeline))
     setup.environment.run()
     assert timeline.stages_ns == {"dds": A + D}
 
