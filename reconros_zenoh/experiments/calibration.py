@@ -170,8 +170,10 @@ def calibrate(
     """
     constants = calibrated_constants(profile)
     with ParallelRuns() as parallel:
+        evaluations = 0
 
         def evaluate(points: Sequence[tuple[Sequence[float], int]]) -> list[_Evaluation]:
+            nonlocal evaluations
             runs = parallel.records(
                 Run(_profile(profile, constants, values), mapping.mapping, requests, each)
                 for values, sample in points
@@ -183,6 +185,7 @@ def calibrate(
                 found.append(
                     _compare(measured, [pooled([next(runs) for _ in range(_SEEDS)]) for _ in measured])
                 )
+                evaluations += 1
                 on_evaluation()
             return found
 
@@ -194,13 +197,7 @@ def calibrate(
         with until_interrupted() as interruption:
             search.run(rounds, evaluate)
             after = evaluate([(search.values, each) for each in range(SAMPLES)])
-            around = evaluate(
-                [
-                    (_moved(constants, search.values, step), 0)
-                    for one in np.eye(len(constants))
-                    for step in (_SENSITIVITY_STEP * one, -_SENSITIVITY_STEP * one)
-                ]
-            )
+            around = evaluate([(each, 0) for each in _around(constants, search.values, _SENSITIVITY_STEP)])
     after = after or search.best
     variances = [np.var([each.objective for each in some], ddof=1) for some in (before, after)]
     sensitivities = _sensitivities(around, before, after) if around else [None] * len(constants)
@@ -224,7 +221,7 @@ def calibrate(
         before=float(np.mean([each.objective for each in before])),
         after=float(np.mean([each.objective for each in after])),
         noise=math.sqrt(np.mean(variances)),
-        evaluations=search.used + len(before) + len(after) + len(around),
+        evaluations=evaluations,
         interrupted=interruption.happened,
     )
 
@@ -242,7 +239,6 @@ class _Search:
     constants: Sequence[Constant]
     values: list[float]
     best: list[_Evaluation]
-    used: int = 0
 
     def run(self, rounds: int, evaluate: _Evaluate) -> None:
         """Search for so many rounds, or until the steps are small."""
@@ -254,7 +250,6 @@ class _Search:
             tried = [self.values, *(_moved(self.constants, self.values, part * way) for part in _FRACTIONS)]
             judges = range(sample + 1, sample + 1 + _JUDGES)
             found = evaluate([(point, each) for point in tried for each in judges])
-            self.used += len(found)
             judged = [found[index * _JUDGES : (index + 1) * _JUDGES] for index in range(len(tried))]
             least = min(range(len(tried)), key=lambda index: sum(each.objective for each in judged[index]))
             self.values, self.best = tried[least], judged[least]
@@ -264,14 +259,10 @@ class _Search:
 
     def _way(self, step: float, sample: int, evaluate: _Evaluate) -> npt.NDArray[np.float64]:
         """Return by how much to change the logarithm of each constant."""
-        steps = step * np.eye(len(self.values))
-        points = [_moved(self.constants, self.values, each) for one in steps for each in (one, -one)]
-        found = evaluate([(point, sample) for point in points])
-        self.used += len(found)
-        residuals = np.array([each.residuals for each in found])
-        logs = np.log(points)
-        widths = np.diagonal(logs[0::2] - logs[1::2])
-        derivatives = ((residuals[0::2] - residuals[1::2]) / widths[:, np.newaxis]).T
+        points = _around(self.constants, self.values, step)
+        residuals = np.array([each.residuals for each in evaluate([(point, sample) for point in points])])
+        widths = np.diagonal(_between_sides(np.log(points)))
+        derivatives = (_between_sides(residuals) / widths[:, np.newaxis]).T
         # Of points on both sides the mean is what would be found between them, with less noise.
         return _least_deviations(residuals.mean(axis=0), derivatives)
 
@@ -296,8 +287,7 @@ def _least_deviations(
 
 def _sensitivities(around: Sequence[_Evaluation], *samples: Sequence[_Evaluation]) -> list[float]:
     """Return the sensitivity to each constant from evaluations of two sides each, with the same seeds."""
-    residuals = np.array([each.residuals for each in around])
-    changes = residuals[0::2] - residuals[1::2]
+    changes = _between_sides(np.array([each.residuals for each in around]))
     spreads = [np.var([each.residuals for each in some], axis=0, ddof=1) for some in samples]
     noise = np.maximum(np.sqrt(np.mean(spreads, axis=0)), _LEAST_NOISE)
     return [float(each) for each in np.sqrt(np.mean((changes / noise) ** 2, axis=1))]
@@ -327,6 +317,17 @@ def _most(quantity: Quantity) -> float:
             return max(_LARGEST_PROBABILITY, quantity.value)
         case _:
             return math.inf
+
+
+def _around(constants: Sequence[Constant], values: Sequence[float], step: float) -> list[list[float]]:
+    """Return for each constant the values with a step up of it, and those with a step down."""
+    steps = step * np.eye(len(values))
+    return [_moved(constants, values, each) for one in steps for each in (one, -one)]
+
+
+def _between_sides(rows: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """Return for each constant the row of its step up minus that of its step down, of points of `_around`."""
+    return rows[0::2] - rows[1::2]
 
 
 def _moved(

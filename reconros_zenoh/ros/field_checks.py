@@ -90,4 +90,4 @@ class FieldChecks:
 def _bound(string: FieldDesc) -> int:
     """Return how long a string can be."""
     bound = string[1][1]
-    return bound or sys.maxsize if isinstance(bound, int) else sys.maxsize
+    return bound if isinstance(bound, int) and bound else sys.maxsize
