@@ -3,25 +3,21 @@
 from __future__ import annotations
 
 import reprlib
-import struct
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 from rosbags.interfaces import Nodetype
-from rosbags.serde import SerdeError
 
 from reconros_zenoh.errors import BadMessageError, UsageError
-from reconros_zenoh.ros.field_checks import FieldChecks
+from reconros_zenoh.ros.cdr import DECODE_ERRORS, ENCODE_ERRORS, decoder, encoder
+from reconros_zenoh.ros.cdr_generator import ENCAPSULATION, fields_of
 from reconros_zenoh.ros.message_arrays import is_unchanging
 from reconros_zenoh.ros.names import dds_type_name
 
 if TYPE_CHECKING:
-    from rosbags.interfaces.typing import Fielddefs, FieldDesc
+    from rosbags.interfaces.typing import FieldDesc
     from rosbags.typesys.store import Typestore
 
-_ENCAPSULATION_LENGTH = 4
-_COUNT = struct.Struct("<I")
 _ENCAPSULATIONS = {  # DDS-XTypes 1.3, Table 60
     0x0000: "CDR big endian",
     0x0001: "CDR little endian",
@@ -49,20 +45,15 @@ class MessageType:
     """
 
     def __init__(self, store: Typestore, name: str) -> None:
-        definition = store.get_msgdef(name)
         self.name = name
         self.dds_name = dds_type_name(name)
         self.type_hash = store.hash_rihs01(name)
-        self.cls: type[Any] = definition.cls
+        self.cls: type[Any] = store.types[name]
+        self.fields = fields_of(store, name)
         self._store = store
         self._nested: dict[str, MessageType] = {}
-        self._size = definition.getsize_cdr
-        self._serialize_body = definition.serialize_cdr_le
-        self._deserialize_body = definition.deserialize_cdr_le
-        self.fields = definition.fields
-        self._fields_before = [field for field, _ in definition.fields[:-1]]
-        self._last_array = _last_array(definition.fields)
-        self._field_checks = FieldChecks(store, name)
+        self._encode = encoder(store, name)
+        self._decode = decoder(store, name)
 
     def __repr__(self) -> str:
         return f"MessageType({self.name!r})"
@@ -103,25 +94,20 @@ class MessageType:
         """
         self.check(message)
         try:
-            if self._field_checks.are_some:
-                self._field_checks.check(message)
-            if self._last_array is not None:
-                field, empty = self._last_array
-                array = getattr(message, field)
-                if _can_be_viewed(array, empty.dtype):
-                    others = [getattr(message, other) for other in self._fields_before]
-                    # The last thing in the header is the count of the last array, 0 so far.
-                    header = self._serialize(self.cls(*others, empty))[: -_COUNT.size]
-                    content: bytes | memoryview = memoryview(array).cast("B").toreadonly()
-                    if not (joined_at_once or is_unchanging(array)):
-                        content = bytes(content)
-                    return header + _COUNT.pack(len(array)), content
-            return (self._serialize(message),)
-        except (AttributeError, TypeError, ValueError, SerdeError, struct.error) as error:
+            payload, array = self._encode(message)
+        except ENCODE_ERRORS as error:
             raise UsageError(
                 f"A message of type {self.name} cannot be serialised: {error}. Give every field a value of "
                 "its type, and arrays of numbers as one-dimensional numpy arrays of the dtype of the field."
             ) from error
+        if array is None:
+            return (payload,)
+        if array.nbytes < _SPLIT_FROM or not array.flags.c_contiguous:
+            return (payload + array.tobytes(),)
+        content: bytes | memoryview = array.data.cast("B").toreadonly()
+        if not (joined_at_once or is_unchanging(array)):
+            content = bytes(content)
+        return payload, content
 
     def decode(self, payload: bytes | memoryview) -> Any:
         """Return the message that `payload` encodes; its arrays of numbers are views of `payload`.
@@ -130,38 +116,31 @@ class MessageType:
         in them does, and `foreign_encoding` for another encapsulation than CDR little endian and for
         strings that are not UTF-8.
         """
-        if len(payload) < _ENCAPSULATION_LENGTH:
+        if len(payload) < len(ENCAPSULATION):
             raise BadMessageError(
                 "truncated", f"{self.name}: no encapsulation header of 4 bytes in a payload of {len(payload)}"
             )
-        encapsulation = payload[0] << 8 | payload[1]
-        if encapsulation != _LITTLE_ENDIAN:
+        if payload[0] or payload[1] != _LITTLE_ENDIAN:
+            encapsulation = payload[0] << 8 | payload[1]
             kind = _ENCAPSULATIONS.get(encapsulation, "unknown")
             raise BadMessageError(
                 "foreign_encoding",
                 f"{self.name}: encapsulation {encapsulation:04x} ({kind}), not 0001 (CDR little endian)",
             )
-        body = memoryview(payload)[_ENCAPSULATION_LENGTH:]
         try:
-            message, end = self._deserialize_body(body, 0, self.cls, self._store)
+            message, end = self._decode(payload)
         except UnicodeDecodeError as error:
             raise BadMessageError(
                 "foreign_encoding", f"{self.name}: a string is not UTF-8: {error}"
             ) from error
-        except (SerdeError, ValueError, struct.error) as error:
+        except DECODE_ERRORS as error:
             raise BadMessageError("truncated", f"{self.name}, {len(payload)} bytes: {error}") from error
         # Some DDS implementations fill the last word of a payload.
-        if len(body) > end + -end % 4:
+        if len(payload) > end + -end % 4:
             raise BadMessageError(
-                "truncated", f"{self.name}: the message ends after {end} of {len(body)} bytes"
+                "truncated", f"{self.name}: the message ends after {end} of {len(payload)} bytes"
             )
         return message
-
-    def _serialize(self, message: Any) -> bytes:
-        data = bytearray(_ENCAPSULATION_LENGTH + self._size(0, message, self._store))
-        data[1] = _LITTLE_ENDIAN
-        self._serialize_body(memoryview(data)[_ENCAPSULATION_LENGTH:], 0, message, self._store)
-        return bytes(data)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -193,28 +172,3 @@ class ActionType:
     cancel_goal: ServiceType
     feedback_message: MessageType
     status: MessageType
-
-
-def _last_array(fields: Fielddefs) -> tuple[str, np.ndarray[Any, Any]] | None:
-    """Return the last field, and an empty array of its dtype, if it is an unbounded array of small numbers.
-
-    Numbers of more than 4 bytes may need padding between their count and the first of them.
-    """
-    field, form = fields[-1]
-    if form[0] != Nodetype.SEQUENCE or form[1][1] != 0 or form[1][0][0] != Nodetype.BASE:
-        return None
-    base = form[1][0][1][0]
-    if base == "string":
-        return None
-    empty = np.empty(0, np.dtype(base).newbyteorder("<"))
-    return (field, empty) if empty.itemsize <= _COUNT.size else None
-
-
-def _can_be_viewed(array: Any, dtype: np.dtype[Any]) -> bool:
-    return (
-        isinstance(array, np.ndarray)
-        and array.nbytes >= _SPLIT_FROM
-        and array.dtype == dtype
-        and array.ndim == 1
-        and array.flags.c_contiguous
-    )
