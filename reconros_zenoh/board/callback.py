@@ -236,11 +236,11 @@ class HardwareThread(DelegateCalls):
         if isinstance(self._time, Native):
             return (yield from self._compute_as_measured(self._time.factor, kernel, *arguments))
         task = partial(host.compute, kernel, *arguments)
-        future = host.start(self._next_step(), task, limit=self._limit)
         if self._time is None:
-            result: R = yield from host.result(future)
+            result: R = yield from host.run(self._next_step(), task, limit=self._limit)
             self._timeline.mark("execution")
             return result
+        future = host.start(self._next_step(), task, limit=self._limit)
         yield self._environment.timeout(self._time.ns)
         self._timeline.mark("execution")
         result = yield from host.late_result(future)
@@ -318,9 +318,8 @@ class HardwareThread(DelegateCalls):
     ) -> Generator[Awaitable, object, R]:
         host, started_ns = self._board.host, self._environment.now
         task = partial(host.compute, measured, kernel, *arguments)
-        future = host.start(self._next_step(), task, limit=self._limit)
         result: R
-        result, took_ns = yield from host.result(future)
+        result, took_ns = yield from host.run(self._next_step(), task, limit=self._limit)
         yield from host.until(started_ns + round(took_ns * factor))
         self._timeline.mark("execution")
         return result

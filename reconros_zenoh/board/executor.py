@@ -268,8 +268,6 @@ class Executor:
 
     def until_poll_ns(self, poll_ns: int, idle_ns: int) -> int:
         """Return how long [ns] until a worker that polls and has been idle for `idle_ns` looks next."""
-        if not poll_ns:
-            return 0
         drift_ns = poll_ns * self._poll_jitter * math.sqrt(idle_ns / poll_ns)
         return round(-(idle_ns + self.board.randomness.gauss(0, drift_ns)) % poll_ns)
 

@@ -176,7 +176,7 @@ class HardwareTopic:
         host = self._board.sending_host
 
         def put(parts: Parts) -> Generator[Awaitable, object, None]:
-            yield from host.result(host.start(self, publisher.put, parts, None))
+            yield from host.run(self, publisher.put, parts, None)
 
         self._tap = Stream(put, QosProfile().depth)
 

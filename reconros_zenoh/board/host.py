@@ -117,9 +117,19 @@ class Host:
             return _in_line(function, *arguments)
         if task is None:
             return self._pool.submit(function, *arguments)
-        if self._expected_ns.get(task, self._in_line_ns) >= self._in_line_ns:
-            return self._pool.submit(self._timed, task, function, *arguments)
-        return _in_line(self._timed, task, function, *arguments)
+        if self._is_short(task):
+            return _in_line(self._timed, task, function, *arguments)
+        return self._pool.submit(self._timed, task, function, *arguments)
+
+    def run(
+        self, task: Hashable, function: Callable[..., R], *arguments: object, limit: Limit | None = None
+    ) -> Generator[Awaitable, object, R]:
+        """Return what a computation returns once it is there; for the parameters see `start`."""
+        if limit is None and self._pool is None:
+            return function(*arguments)
+        if limit is None and self._is_short(task):
+            return self._timed(task, function, *arguments)
+        return (yield from self.result(self.start(task, function, *arguments, limit=limit)))
 
     def _start_limited(
         self, limit: Limit, function: Callable[..., R], *arguments: object
@@ -184,6 +194,10 @@ class Host:
         """Start no other computation, and wait for a while for those that run."""
         if self._pool is not None:
             self._pool.close()
+
+    def _is_short(self, task: Hashable) -> bool:
+        """Tell whether a computation of this kind is over before a thread of the pool would begin with it."""
+        return self._expected_ns.get(task, self._in_line_ns) < self._in_line_ns
 
     def _timed(self, task: Hashable, function: Callable[..., R], *arguments: object) -> R:
         started_ns = time.perf_counter_ns()

@@ -208,13 +208,14 @@ class SubscriptionSource(Reader):
         """Accept a message from the transport; callable from any thread."""
         topics = self._board.topics
         # What this board publishes comes back from the network, too, where somebody else reads it.
-        known = topics is not None and received.publisher in topics.publishers
-        if not known and self._admits(received.publisher):
-            super().arrive(received)
+        if topics is not None and received.publisher in topics.publishers:
+            return
+        if self._own is None or self._own.passes(received.publisher):
+            self._board.environment.post(self._enter, received)
 
     def deliver(self, received: Received, timeline: Timeline, way: _Way) -> None:
         """Accept a message from this board once it has gone its way."""
-        if not self._admits(received.publisher):
+        if self._own is not None and not self._own.passes(received.publisher):
             return
         try:
             if self._check is not None:
@@ -223,9 +224,6 @@ class SubscriptionSource(Reader):
             self._board.context.rejections.add(self._topic, received.publisher, error)
             return
         self._stream.put((received, timeline, way))
-
-    def _admits(self, publisher: bytes) -> bool:
-        return self._own is None or self._own.passes(publisher)
 
 
 class ServiceSource(Reader):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from types import GeneratorType
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING
 
 from reconros_zenoh.board.callback import HardwareThread, ThreadExit
 from reconros_zenoh.board.host import measured
@@ -61,7 +61,7 @@ class Worker(ABC):
             dispatch = self._executor.select(self)
             if dispatch is None:
                 dispatch = yield from self._wait()
-            event = cast("Event", dispatch.message)
+            event: Event = dispatch.message  # type: ignore[assignment] # of its source
             self.serves, self.since_ns = event.timeline, self._environment.now
             event.timeline.callback = dispatch.entry.name
             try:
@@ -75,9 +75,11 @@ class Worker(ABC):
         idle_since_ns = self._environment.now
         while True:
             yield PARK
-            delay_ns = self._executor.until_poll_ns(self._poll_ns, self._environment.now - idle_since_ns)
-            if delay_ns:
-                yield self._environment.timeout(delay_ns)
+            if self._poll_ns:
+                idle_ns = self._environment.now - idle_since_ns
+                delay_ns = self._executor.until_poll_ns(self._poll_ns, idle_ns)
+                if delay_ns:
+                    yield self._environment.timeout(delay_ns)
             dispatch = self._executor.select(self)
             if dispatch is not None:
                 return dispatch
@@ -120,7 +122,7 @@ class SoftwareWorker(Worker):
         board, timeline = self._board, event.timeline
         yield from board.cpu.run(self._executor.dispatch_ns)
         timeline.mark("dispatch")
-        implementation = cast("SoftwareImplementation", dispatch.implementation)
+        implementation: SoftwareImplementation = dispatch.implementation  # type: ignore[assignment]
         context = SoftwareContext(board, dispatch.entry.name, implementation.time, event.sequence_number)
         try:
             response = yield from self._within(
@@ -145,12 +147,13 @@ class SoftwareWorker(Worker):
             response = yield from host.late_result(future)
             timeline.mark("overrun")
         elif time is None:
-            response = yield from host.result(host.start(task, function, event.message, context, limit=limit))
+            response = yield from host.run(task, function, event.message, context, limit=limit)
             timeline.mark("execution")
         else:
             started_ns = self._environment.now
-            future_and_time = host.start(task, measured, function, event.message, context, limit=limit)
-            response, took_ns = yield from host.result(future_and_time)
+            response, took_ns = yield from host.run(
+                task, measured, function, event.message, context, limit=limit
+            )
             left_ns = round(took_ns * time.factor) - (self._environment.now - started_ns)
             yield from board.cpu.run(left_ns)
             timeline.mark("execution")
@@ -168,7 +171,7 @@ class HardwareWorker(Worker):
         board, timeline = self._board, event.timeline
         yield from board.cpu.run(self._executor.dispatch_ns)
         timeline.mark("dispatch")
-        implementation = cast("HardwareImplementation", dispatch.implementation)
+        implementation: HardwareImplementation = dispatch.implementation  # type: ignore[assignment]
         yield from board.zycap.write_bitstream(self._slot, implementation.bitstream)
         timeline.mark("reconfiguration")
         self._slot.busy.begin()

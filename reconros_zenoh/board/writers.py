@@ -83,8 +83,7 @@ class Writer:
     def _send(self, outgoing: _Outgoing) -> Generator[Awaitable, object, None]:
         yield from self._board.dds.send(outgoing.size, outgoing.timeline)
         # A large message is copied into the transport: not by the thread that keeps the clock.
-        host = self._board.sending_host
-        yield from host.result(host.start(self, outgoing.send))
+        yield from self._board.sending_host.run(self, outgoing.send)
         self._board.spans.add(outgoing.timeline)
         self.sent += 1
         self.ages_ns.append(outgoing.timeline.age_ns)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
 import simpy
@@ -34,6 +35,10 @@ class VirtualEnvironment(_Present, simpy.Environment):
     def clock_ns(self) -> int:
         """Return the time of this very moment [ns]; callable from any thread."""
         return self.now
+
+    def peek(self) -> float:
+        """Return when the next event is due [ns], infinity without one (SimPy raises and catches then)."""
+        return self._queue[0][0] if self._queue else math.inf
 
     def run(self, until: float | simpy.Event | None = None) -> Any:
         """Run until that time [ns], that event, or the end of all events; see `simpy.Environment.run`.

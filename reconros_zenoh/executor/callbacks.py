@@ -59,7 +59,7 @@ class Dispatch(NamedTuple):
     @property
     def implementation(self) -> object:
         """What the worker starts: a function, or a bitstream."""
-        return self.entry.mask[self.resource]
+        return self.entry.mask.implementations[self.resource]
 
 
 class CallbackList:
@@ -135,13 +135,14 @@ class CallbackLists(ABC):
         """Take the entry's oldest event and mark it running until `finish`."""
         message = entry.source.take()
         entry.running = True
-        self.refresh(entry)
+        self._lists[entry.kind].refresh(entry)
         return Dispatch(entry, resource, message)
 
     def finish(self, dispatch: Dispatch) -> None:
         """Note that the dispatched callback has run to completion."""
-        dispatch.entry.running = False
-        self.refresh(dispatch.entry)
+        entry = dispatch.entry
+        entry.running = False
+        self._lists[entry.kind].refresh(entry)
 
 
 def lowest(bits: int) -> int:

@@ -34,6 +34,3 @@ class ResourceMask:
 
     def __contains__(self, resource: int) -> bool:
         return resource in self.implementations
-
-    def __getitem__(self, resource: int) -> object:
-        return self.implementations[resource]

@@ -78,8 +78,8 @@ class MessageType:
 
     def check(self, message: object) -> None:
         """Raise UsageError for what is no message of this type, which may be that of another registry."""
-        if type(message) is not self.cls and getattr(message, "__msgtype__", None) != self.name:
-            found = getattr(message, "__msgtype__", None)
+        found = getattr(message, "__msgtype__", None)
+        if found != self.name:
             raise UsageError(
                 f"A message of type {self.name} is wanted, not "
                 + (f"one of type {found}." if found else f"{reprlib.repr(message)}.")
@@ -92,7 +92,8 @@ class MessageType:
         With `joined_at_once` none is: then it must not change before the parts are joined. Raises UsageError
         for a message of another type, or whose fields do not have their types.
         """
-        self.check(message)
+        if type(message) is not self.cls:
+            self.check(message)
         try:
             payload, array = self._encode(message)
         except ENCODE_ERRORS as error:
