@@ -8,6 +8,7 @@ the position, so there is one for each position modulo 8.
 
 from __future__ import annotations
 
+import reprlib
 import struct
 from typing import TYPE_CHECKING, Any, NoReturn, TypeAlias
 
@@ -85,6 +86,9 @@ class _Encoder(Generator):
         return message
 
     def _number(self, field: Field, code: str) -> str:
+        if code == "?":  # whatever is true would be packed
+            self._write(f"if type({field.value}) is not {self._constant(bool)}:")
+            self._write(f"    {self._constant(_check_bool)}({field.label!r}, {field.value})")
         self._run.append(Number(code, struct.calcsize(f"<{code}"), field.value))
         return field.value
 
@@ -229,6 +233,11 @@ def _check_array(label: str, array: Any, dtypes: tuple[np.dtype[Any], ...]) -> N
         _refuse(f"{label} is {found}, not an array of {dtypes[0]}")
     if array.ndim != 1:
         _refuse(f"{label} has {array.ndim} dimensions, not one")
+
+
+def _check_bool(label: str, value: object) -> None:
+    if not isinstance(value, bool | np.bool_):
+        _refuse(f"{label} is {reprlib.repr(value)}, not a bool")
 
 
 def _refuse(problem: str) -> NoReturn:

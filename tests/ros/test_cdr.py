@@ -288,6 +288,19 @@ def test_a_number_that_does_not_fit_is_a_usage_error(value: Any) -> None:
         kind.encode(kind.cls(value))
 
 
+@pytest.mark.parametrize("value", [True, False, np.bool_(True)])
+def test_a_bool(value: Any) -> None:
+    kind = REGISTRY.message("std_msgs/Bool")
+    assert b"".join(kind.encode(kind.cls(value))) == b"\0\1\0\0" + bytes([bool(value)])
+
+
+@pytest.mark.parametrize("value", ["no", 1, None, 0.0])
+def test_what_is_true_or_false_is_no_bool(value: Any) -> None:
+    kind = REGISTRY.message("std_msgs/Bool")
+    with pytest.raises(UsageError, match=f"'data' of std_msgs/msg/Bool is {value!r}, not a bool"):
+        kind.encode(kind.cls(value))
+
+
 def test_a_number_beyond_those_of_its_type_is_a_usage_error() -> None:
     kind = REGISTRY.message("std_msgs/Float32")
     with pytest.raises(UsageError, match="cannot be serialised: float too large"):
@@ -478,6 +491,13 @@ def test_another_encapsulation_is_named(header: str, kind: str) -> None:
     error = refused(STRING, bytes.fromhex(header) + HELLO[2:])
     assert error.reason == "foreign_encoding"
     assert f"{header} ({kind})" in error.detail
+
+
+def test_a_sequence_over_its_bound_is_refused() -> None:
+    kind = REGISTRY.message("lab_msgs/Bounded")
+    payloads = [rosbags_bytes(kind, kind.cls(1, np.zeros(count, np.uint32))) for count in (300, 301)]
+    assert len(kind.decode(payloads[0]).data) == 300
+    assert "'data' of lab_msgs/msg/Bounded has more than 300" in refused(kind, payloads[1]).detail
 
 
 def test_the_options_of_the_encapsulation_are_ignored() -> None:
