@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from itertools import count
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, SupportsIndex
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from reconros_zenoh.board.control import status
 from reconros_zenoh.board.executor import Executor
 from reconros_zenoh.board.profile import Profile, read_profile
 from reconros_zenoh.board.sources import ServiceSource, SubscriptionSource, TimerSource
+from reconros_zenoh.clock.duration import duration_ns
 from reconros_zenoh.clock.virtual import VirtualEnvironment, succeed_once
 from reconros_zenoh.errors import UsageError
 from reconros_zenoh.measure.trace_plots import trace_figure
@@ -62,10 +63,15 @@ class VirtualDesktop:
         return self.environment.now / 1e6
 
     def run(self, seconds: float) -> None:
-        """Let so many seconds of virtual time pass; raise UsageError for less than a nanosecond."""
-        if not seconds * _SECOND_NS >= 1:
-            raise UsageError(f"a board cannot run for {seconds} s. Give more than 0.")
-        self.environment.run(until=self.environment.now + round(seconds * _SECOND_NS))
+        """Let so many seconds of virtual time pass.
+
+        Raises UsageError for less than a nanosecond, and for callbacks that nobody has started.
+        """
+        if self.executor.awaits_spin:
+            raise UsageError(
+                "the board has callbacks that never run. Call board.executor.spin() before this."
+            )
+        self.environment.run(until=self.environment.now + duration_ns("run", seconds, _SECOND_NS))
 
     def listen(self, topic: str, type_name: str) -> list[Any]:
         """Return a list to which each message that is published on the topic from now on is appended."""
@@ -88,6 +94,7 @@ class VirtualDesktop:
         does not come within `limit_s` is NaN. Raises UsageError when nobody on the board hears the requests,
         or nobody publishes answers.
         """
+        limit_ns = duration_ns("limit_s", limit_s, _SECOND_NS)
         self._check_ends(EndpointKind.SUBSCRIPTION, *requests)
         self._check_ends(EndpointKind.PUBLISHER, *answers)
         request_type = self.types.message(requests[1])
@@ -100,8 +107,8 @@ class VirtualDesktop:
         for fields in messages:
             arrived = self.environment.event()
             sent_ns = self.environment.now
-            limit = self.environment.timeout(round(limit_s * _SECOND_NS))
-            publisher.publish(request_type.cls(**fields))
+            limit = self.environment.timeout(limit_ns)
+            publisher.publish(request_type.message(**fields))
             self.environment.run(until=arrived | limit)
             times_ms.append((self.environment.now - sent_ns) / 1e6 if arrived.triggered else np.nan)
         subscription.close()
@@ -156,18 +163,20 @@ class VirtualBoard(VirtualDesktop):
 
     def __init__(
         self,
-        profile: str | Profile = "native",
+        profile: str | Path | Profile = "native",
         *,
         slots: int = 0,
         software_workers: int = 2,
         hardware_workers: int | None = None,
         seed: int = 0,
     ) -> None:
+        if not (isinstance(slots, SupportsIndex) and slots >= 0):
+            raise UsageError(f"a board cannot have {slots!r} slots. Give 0 or more.")
         super().__init__(TypeRegistry())
         self.board = Board(
             self.environment,
             self._context(),
-            read_profile(profile) if isinstance(profile, str) else profile,
+            profile if isinstance(profile, Profile) else read_profile(profile),
             tuple(SlotPlan(slot, _SLOT.lut, _SLOT.dsp, _SLOT.bram36) for slot in range(slots)),
             seed=seed,
             traced=True,
@@ -187,7 +196,7 @@ class VirtualBoard(VirtualDesktop):
 
     def timer(self, period_ms: float) -> TimerSource:
         """Return a timer of the board."""
-        return TimerSource(self.board, round(period_ms * 1e6))
+        return TimerSource(self.board, duration_ns("the period of a timer", period_ms, 1_000_000))
 
     def service(self, name: str, type_name: str) -> ServiceSource:
         """Return a service server of the board."""
@@ -215,9 +224,9 @@ class VirtualProject(VirtualDesktop):
     def __init__(
         self,
         folder: str | Path,
-        profile: str | Profile | None = None,
+        profile: str | Path | Profile | None = None,
         *,
-        mapping: str | None = None,
+        mapping: str | Path | None = None,
         seed: int = 0,
     ) -> None:
         project = load_project(Path(folder))

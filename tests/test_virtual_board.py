@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from importlib.resources import files
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -173,16 +175,66 @@ def test_a_histogram_of_nothing() -> None:
         rz.histogram([np.nan])
 
 
+NO_TIMES = (0, -1, 1e-10, np.nan, np.inf, 1e30, "1", None)
+
+
 def test_what_makes_no_sense_is_refused() -> None:
-    for numbers in ({"slots": -1}, {"software_workers": -2}, {"hardware_workers": -1}):
-        with pytest.raises(rz.UsageError, match=r"there cannot be -. workers"):
-            rz.VirtualBoard(**numbers)
+    for count in (-1, 1.5, "2", None):
+        with pytest.raises(rz.UsageError, match=f"a board cannot have {count!r} slots. Give 0 or more"):
+            rz.VirtualBoard(slots=count)  # type: ignore[arg-type]
+        for workers in ("software_workers", "hardware_workers"):
+            if (workers, count) == ("hardware_workers", None):
+                continue  # one per slot
+            with pytest.raises(rz.UsageError, match=f"there cannot be {count!r} workers. Give 0 or more"):
+                rz.VirtualBoard(**{workers: count})  # type: ignore[arg-type]
     board = rz.VirtualBoard()
-    with pytest.raises(rz.UsageError, match="a period of 0 ns"):
-        board.timer(0)
-    for seconds in (0, -1, 1e-10, np.nan):
-        with pytest.raises(rz.UsageError, match=f"cannot run for {seconds} s"):
-            board.run(seconds)
+    doubling(board)
+    trip = ("/in", WORD), ("/out", WORD), numbers(2)
+    for time in NO_TIMES:
+        with pytest.raises(
+            rz.UsageError, match=f"the period of a timer is {re.escape(repr(time))}: write a time above 0"
+        ):
+            board.timer(time)  # type: ignore[arg-type]
+        with pytest.raises(
+            rz.UsageError, match=f"run is {re.escape(repr(time))}: write a time above 0, at most 1000000000"
+        ):
+            board.run(time)  # type: ignore[arg-type]
+        with pytest.raises(rz.UsageError, match=f"limit_s is {re.escape(repr(time))}: write a time above 0"):
+            board.round_trips(*trip, limit_s=time)  # type: ignore[arg-type]
     for depth in (0, -1):
         with pytest.raises(rz.UsageError, match="keeps none"):
             board.subscription("/in", WORD, rz.QosProfile(depth=depth))
+
+
+def test_fields_of_a_message_that_are_not_those_of_its_type() -> None:
+    board = rz.VirtualBoard()
+    doubling(board)
+    told = f"Give a message of type {WORD} its fields, data: 'dta' is none of them, 'data' is missing."
+    with pytest.raises(rz.UsageError) as caught:
+        board.round_trips(("/in", WORD), ("/out", WORD), [{"dta": 1}])
+    assert str(caught.value) == told
+    flip = board.client("/flip", "std_srvs/srv/SetBool")
+    go = "example_interfaces/action/Fibonacci"
+    makers = (board.publisher("/out", WORD).message, flip.request, board.action_client("/go", go).goal)
+    for make in (*makers, board.action("/go", go).result, board.action("/go", go).feedback):
+        with pytest.raises(rz.UsageError, match="'dta' is none of them"):
+            make(dta=1)
+
+
+def test_a_board_whose_callbacks_nobody_has_started_does_not_run() -> None:
+    board = rz.VirtualBoard()
+    board.run(1)  # there is nothing to start
+    board.executor.add_sw_callback("tick", rz.TMR, board.timer(100), lambda _, ctx: None)
+    with pytest.raises(rz.UsageError, match=r"callbacks that never run\. Call board\.executor\.spin\(\)"):
+        board.run(1)
+    board.executor.spin()
+    board.run(np.int32(1))
+    assert board.status()["callbacks"]["tick"]["calls"] == 9
+
+
+def test_a_profile_of_ones_own_is_a_path_or_its_name(tmp_path: Path) -> None:
+    shipped = files("reconros_zenoh.board") / "profiles" / "native.toml"
+    own = tmp_path / "mine.toml"
+    own.write_text(shipped.read_text().replace('name = "native"', 'name = "mine"'))
+    for profile in (own, str(own)):
+        assert rz.VirtualBoard(profile).status()["profile"] == "mine"

@@ -47,11 +47,11 @@ class ActionSource(Source):
 
     def result(self, **fields: object) -> Any:
         """Return a result of the action's type with these fields."""
-        return self._type.result.cls(**fields)
+        return self._type.result.message(**fields)
 
     def feedback(self, **fields: object) -> Any:
         """Return feedback of the action's type with these fields."""
-        return self._type.feedback.cls(**fields)
+        return self._type.feedback.message(**fields)
 
     def take(self) -> Event:
         """Begin to work on the oldest goal."""
@@ -95,7 +95,7 @@ class ActionClientSource(Source):
 
     def goal(self, **fields: object) -> Any:
         """Return a goal of the action's type with these fields."""
-        return self._type.goal.cls(**fields)
+        return self._type.goal.message(**fields)
 
     def new_goal_id(self) -> bytes:
         """Return the id of a new goal: 16 bytes; callable from any thread."""

@@ -13,7 +13,7 @@ from reconros_zenoh.board.address_space import PlacedMessage, UnmappedError
 from reconros_zenoh.board.delegate_calls import DelegateCalls
 from reconros_zenoh.board.host import measured
 from reconros_zenoh.board.noted_calls import noted
-from reconros_zenoh.board.timing import Native, cycles_ns
+from reconros_zenoh.board.timing import Native, check_cycles, cycles_ns
 from reconros_zenoh.errors import PageFaultError
 from reconros_zenoh.ros.forms import is_number, number
 from reconros_zenoh.ros.message_arrays import arrays_of, lies_in
@@ -249,7 +249,11 @@ class HardwareThread(DelegateCalls):
 
     @noted
     def compute_cycles(self, cycles: int) -> Generator[Awaitable, object, None]:
-        """Return when so many cycles of the slot's clock have passed; at once where nothing is modelled."""
+        """Return when so many cycles of the slot's clock have passed; at once where nothing is modelled.
+
+        Raises UsageError for less than none.
+        """
+        check_cycles("compute_cycles", cycles)
         if self._time is not None:
             yield self._environment.timeout(cycles_ns(cycles, self._slot.clock_hz))
             self._timeline.mark("execution")

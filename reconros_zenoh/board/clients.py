@@ -60,7 +60,7 @@ class ClientSource(Reader):
 
     def request(self, **fields: object) -> Any:
         """Return a request of the service's type with these fields."""
-        return self._client.service_type.request.cls(**fields)
+        return self._client.service_type.request.message(**fields)
 
     def encode(self, request: object) -> Parts:
         """Return the request as it goes over the wire; callable from any thread."""

@@ -7,7 +7,7 @@ from collections import Counter, defaultdict
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import partial
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, SupportsIndex
 
 from reconros_zenoh.board.additions import check_addition
 from reconros_zenoh.board.bitstream import Bitstream, read_bitstreams
@@ -18,6 +18,7 @@ from reconros_zenoh.board.host import Limit
 from reconros_zenoh.board.software import SoftwareImplementation, is_plain
 from reconros_zenoh.board.timing import describe, hardware_time, software_time
 from reconros_zenoh.board.workers import HardwareWorker, SoftwareWorker
+from reconros_zenoh.clock.duration import duration_ns
 from reconros_zenoh.errors import BadMessageError, UsageError
 from reconros_zenoh.executor.callbacks import CallbackEntry, CallbackKind
 from reconros_zenoh.executor.reconros import ReconrosExecutor
@@ -70,10 +71,9 @@ class Executor:
         bitstreams: Path | None = None,
         kind: ExecutorKind = "reconros",
     ) -> None:
-        if software_workers < 0 or hardware_workers < 0:
-            raise UsageError(
-                f"there cannot be {min(software_workers, hardware_workers)} workers. Give 0 or more."
-            )
+        for workers in (software_workers, hardware_workers):
+            if not (isinstance(workers, SupportsIndex) and workers >= 0):
+                raise UsageError(f"there cannot be {workers!r} workers. Give 0 or more.")
         if hardware_workers > len(board.slots):
             raise UsageError(
                 f"hardware_workers = {hardware_workers} is more than the slots of the project: "
@@ -206,6 +206,11 @@ class Executor:
                 partial(self._became_ready, entry), check, in_hardware=bool(registration.slots)
             )
 
+    @property
+    def awaits_spin(self) -> bool:
+        """Whether it has callbacks, and `spin` has not been called."""
+        return bool(self._registrations) and not self._is_spinning
+
     def select(self, worker: Worker) -> Dispatch | None:
         """Return the callback that this worker must run now, its message taken, or None."""
         dispatch = self._policy.select(worker, worker.resource)
@@ -326,6 +331,4 @@ def _check_message(callback: str, check: Callable[[Any], None], message: object)
 def _limit(callback: str, limit_ms: float | None) -> Limit | None:
     if limit_ms is None:
         return None
-    if not 0 < limit_ms < math.inf:
-        raise UsageError(f"limit_ms={limit_ms} of callback {callback!r}: write a time above 0.")
-    return Limit(callback, round(limit_ms * 1e6))
+    return Limit(callback, duration_ns(f"limit_ms of callback {callback!r}", limit_ms, 1_000_000))

@@ -299,7 +299,7 @@ class HmtWriter:
 
     def message(self, **fields: object) -> Any:
         """Return a message of the topic's type with these fields."""
-        return self._topic.type.cls(**fields)
+        return self._topic.type.message(**fields)
 
     def encode(self, message: object) -> Any:  # noqa: ARG002 # as every writer has it
         """Raise UsageError: there is no way from software onto a stream but a gateway."""

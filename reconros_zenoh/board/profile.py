@@ -220,20 +220,18 @@ def profile_names() -> list[str]:
     return sorted(path.stem for path in _FOLDER.glob("*.toml"))
 
 
-def profile_path(name_or_file: str) -> Path:
+def profile_path(name_or_file: str | Path) -> Path:
     """Return the file of the shipped profile of that name, or that file; UsageError for an unknown name."""
-    names = profile_names()
-    if name_or_file in names:
-        return _FOLDER / f"{name_or_file}.toml"
-    path = Path(name_or_file)
+    names, given = profile_names(), str(name_or_file)
+    if given in names:
+        return _FOLDER / f"{given}.toml"
+    path = Path(given)
     if path.suffix != ".toml":
-        raise UsageError(
-            f"no profile named {name_or_file!r}. Give one of {', '.join(names)} or a .toml file."
-        )
+        raise UsageError(f"no profile named {given!r}. Give one of {', '.join(names)} or a .toml file.")
     return path
 
 
-def read_profile(name_or_file: str) -> Profile:
+def read_profile(name_or_file: str | Path) -> Profile:
     """Return the shipped profile of that name, or the one in that file.
 
     Raise FileError with the line for a file that is not a profile, UsageError for an unknown name.

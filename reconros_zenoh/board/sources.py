@@ -266,8 +266,6 @@ class TimerSource(Source):
     kind = CallbackKind.TMR
 
     def __init__(self, board: Board, period_ns: int) -> None:
-        if period_ns < 1:
-            raise UsageError(f"a timer cannot have a period of {period_ns} ns. Give it a longer one.")
         super().__init__()
         self._board = board
         self._period_ns = period_ns

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import inf
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
+
+import numpy as np
 
 from reconros_zenoh.errors import UsageError
 
@@ -20,8 +23,7 @@ class Cycles:
     count: int
 
     def __post_init__(self) -> None:
-        if self.count < 0:
-            raise UsageError(f"Cycles({self.count}): write 0 or more.")
+        check_cycles("Cycles", self.count)
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,8 +33,8 @@ class Native:
     factor: float = 1.0
 
     def __post_init__(self) -> None:
-        if not 0 < self.factor < float("inf"):
-            raise UsageError(f"Native({self.factor}): write a factor above 0.")
+        if not (isinstance(self.factor, int | float | np.number) and 0 < self.factor < inf):
+            raise UsageError(f"Native({self.factor!r}): write a factor above 0.")
 
 
 Timing: TypeAlias = Cycles | Native
@@ -72,9 +74,16 @@ def hardware_time(profile: Profile, callback: str, timing: Timing | None, clock_
     return FixedTime("table", round(table_ns * profile.model.fabric.thread_clock.hz / clock_hz))
 
 
+def check_cycles(given: str, count: float) -> None:
+    """Raise UsageError unless there can be so many cycles; `given` is what they were given to."""
+    if not (isinstance(count, int | float | np.number) and 0 <= count < inf):
+        raise UsageError(f"{given}({count!r}): write 0 or more cycles.")
+
+
 def cycles_ns(count: int, clock_hz: float) -> int:
     """Return how long so many cycles take [ns]."""
-    return round(count * _SECOND_NS / clock_hz)
+    # A number of a message may be a numpy one of 32 bits, which the product would not fit.
+    return round(int(count) * _SECOND_NS / clock_hz)
 
 
 def describe(time: ExecutionTime) -> dict[str, Any]:

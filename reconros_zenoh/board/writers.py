@@ -122,7 +122,7 @@ class TopicWriter:
 
     def message(self, **fields: object) -> Any:
         """Return a message of the topic's type with these fields."""
-        return self._publisher.message_type.cls(**fields)
+        return self._publisher.message_type.message(**fields)
 
     def encode(self, message: object) -> Parts:
         """Return the message as it goes over the wire; callable from any thread."""

@@ -83,7 +83,7 @@ def map_communication(
     if live:
         graph, project = _read_live(router, domain, hardware or [], source), None
     else:
-        graph, project = _read(source, mapping)
+        graph, project = _read(source, mapping, with_sizes=model is not None)
     if project is None and (mapping is not None or apply):
         raise UsageError(f"{'--apply' if apply else '--mapping'} needs the folder of a project.")
     rule = map_topics(graph)
@@ -109,7 +109,9 @@ def map_communication(
         print("\n".join(result["applied"]) or "build.cfg has all of this already")
 
 
-def _read(source: Path | None, mapping: str | None) -> tuple[ComputationGraph, _MappedProject | None]:
+def _read(
+    source: Path | None, mapping: str | None, *, with_sizes: bool
+) -> tuple[ComputationGraph, _MappedProject | None]:
     if source is None:
         raise UsageError("nothing to map. Give the folder of a project, a graph file (*.yaml), or --live.")
     if source.suffix in {".yaml", ".yml"}:
@@ -121,7 +123,8 @@ def _read(source: Path | None, mapping: str | None) -> tuple[ComputationGraph, _
 
     files = read_project(source)
     project = _MappedProject(files, files.mapping(mapping))
-    return read_project_graph(files.configuration, project.mapping), project
+    types = files.types() if with_sizes else None  # to load them takes as long as all the rest
+    return read_project_graph(files.configuration, project.mapping, types), project
 
 
 def _add_project(

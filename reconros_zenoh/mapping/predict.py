@@ -185,7 +185,7 @@ def predict_topic(graph: ComputationGraph, costs: TransferCosts, topic: Topic, r
 
     changeover = _changeover(lambda size: _faster(*compare(size)))
     if topic.size is None:
-        unknown = Decision(rule.mapping, "No size is given, so the rule decides.")
+        unknown = Decision(rule.mapping, "No size is known, so the rule decides.")
         return Prediction(unknown, changeover=changeover)
     smt, gateway = compare(topic.size)
     reason = (

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from reconros_zenoh.mapping.communication import TopicMapping
 from reconros_zenoh.mapping.graph import ComputationGraph, Side, Topic
-from reconros_zenoh.project.communication import endpoint_name, gateway_pair
+from reconros_zenoh.project.communication import declared_type, endpoint_name, gateway_pair
+from reconros_zenoh.ros.message_size import fixed_bytes
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -15,6 +16,7 @@ if TYPE_CHECKING:
     from reconros_zenoh.project.build_cfg import BuildConfiguration
     from reconros_zenoh.project.mapping_file import ProjectMapping
     from reconros_zenoh.project.resource_groups import Resource
+    from reconros_zenoh.ros.type_registry import TypeRegistry
 
 OUTSIDE = {"rospub": "(from outside)", "rossub": "(to outside)"}
 """The nodes, in software, that stand for publishers and subscribers elsewhere than in the project."""
@@ -61,9 +63,13 @@ def topic_ends(configuration: BuildConfiguration, mapping: ProjectMapping) -> li
     return ends
 
 
-def read_project_graph(configuration: BuildConfiguration, mapping: ProjectMapping) -> ComputationGraph:
+def read_project_graph(
+    configuration: BuildConfiguration, mapping: ProjectMapping, types: TypeRegistry | None = None
+) -> ComputationGraph:
     """Return the graph of all nodes that have topics; see `topic_ends` for what is in hardware.
 
+    With `types` a topic has the size of its messages where those of its type are all of one size; then
+    FileError for a type that nobody defines.
     A ROS node with callbacks on both sides becomes a node on each. A topic of which the project has only
     publishers, or only subscribers, has its other ends elsewhere, where nothing is in hardware: a node of
     OUTSIDE stands for them. One also subscribes to a topic that has a gateway and no end in software.
@@ -89,7 +95,10 @@ def read_project_graph(configuration: BuildConfiguration, mapping: ProjectMappin
         if name in found and all(nodes[node] is Side.HARDWARE for of in found[name].values() for node in of):
             found[name]["rossub"][OUTSIDE["rossub"]] = None
             nodes[OUTSIDE["rossub"]] = Side.SOFTWARE
-    topics = tuple(Topic(name, tuple(of["rospub"]), tuple(of["rossub"])) for name, of in found.items())
+    sizes = {end.topic: _fixed_bytes(configuration, end, types) for end in ends} if types else {}
+    topics = tuple(
+        Topic(name, tuple(of["rospub"]), tuple(of["rossub"]), sizes.get(name)) for name, of in found.items()
+    )
     elsewhere = [name for name in OUTSIDE.values() if name in nodes]
     return ComputationGraph(nodes, topics, _notes(configuration, mapping, elsewhere))
 
@@ -122,6 +131,10 @@ def shared_slots(
                 "reconfigure a slot for each message."
             )
     return notes
+
+
+def _fixed_bytes(configuration: BuildConfiguration, end: TopicEnd, types: TypeRegistry) -> int | None:
+    return fixed_bytes(declared_type(configuration.path, end.resource, types.message))
 
 
 def _notes(configuration: BuildConfiguration, mapping: ProjectMapping, outside: list[str]) -> tuple[str, ...]:

@@ -10,8 +10,8 @@ from reconros_zenoh.errors import FileError, UsageError
 from reconros_zenoh.gateway.filters import Pair, conflict
 from reconros_zenoh.project.build_cfg import RosGateway
 from reconros_zenoh.project.gateway_slots import gateway_slots
+from reconros_zenoh.ros.message_size import smallest_bytes
 from reconros_zenoh.ros.names import resolve
-from reconros_zenoh.ros.zero_message import zero_message
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -103,7 +103,7 @@ def check_fifos(configuration: BuildConfiguration, types: Callable[[], TypeRegis
         if end.fifo.message_bytes is None:
             continue
         message_type = declared_type(configuration.path, end, types().message)
-        smallest = sum(map(len, message_type.encode(zero_message(message_type))))
+        smallest = smallest_bytes(message_type)
         if end.fifo.message_bytes < smallest:
             raise FileError(
                 configuration.path,

@@ -78,7 +78,7 @@ class ProjectFiles:
     def _types(self) -> TypeRegistry:
         return self.interfaces.registry()
 
-    def profile(self, name_or_file: str | None) -> Profile:
+    def profile(self, name_or_file: str | Path | None) -> Profile:
         """Return the profile of that name or in that file; None stands for that of the project's board.
 
         See `target_profile`.
@@ -89,7 +89,7 @@ class ProjectFiles:
     def _profile(self) -> Profile:
         return read_profile(target_profile(self.configuration))
 
-    def mapping(self, name_or_file: str | None) -> ProjectMapping:
+    def mapping(self, name_or_file: str | Path | None) -> ProjectMapping:
         """Return the mapping of that name in the project's folder `mappings`, or the one in that file.
 
         None stands for the first in the folder, or, if there is none, for the default.
@@ -130,15 +130,15 @@ class ProjectFiles:
                 refused[path] = error
         return refused
 
-    def mapping_path(self, name_or_file: str) -> Path:
+    def mapping_path(self, name_or_file: str | Path) -> Path:
         """Return where the mapping stands; raise UsageError when there is none of that name."""
-        shipped = self.mapping_files()
-        if name_or_file in shipped:
-            return shipped[name_or_file]
-        path = Path(name_or_file)
+        shipped, given = self.mapping_files(), str(name_or_file)
+        if given in shipped:
+            return shipped[given]
+        path = Path(given)
         if path.suffix != ".toml":
             known = f"one of {', '.join(shipped)} or " if shipped else ""
-            raise UsageError(f"no mapping named {name_or_file!r}. Give {known}a .toml file.")
+            raise UsageError(f"no mapping named {given!r}. Give {known}a .toml file.")
         return path
 
     def mapping_files(self) -> dict[str, Path]:

@@ -76,6 +76,18 @@ class MessageType:
             owner = owner.nested(form[1]) if owner and form[0] == Nodetype.NAME else None
         return form
 
+    def message(self, **fields: object) -> Any:
+        """Return a message with these fields; raise UsageError unless they are those of the type."""
+        try:
+            return self.cls(**fields)
+        except TypeError:
+            names = [name for name, _ in self.fields]
+            wrong = [f"{name!r} is none of them" for name in fields if name not in names]
+            wrong += [f"{name!r} is missing" for name in names if name not in fields]
+            raise UsageError(
+                f"Give a message of type {self.name} its fields, {', '.join(names)}: {', '.join(wrong)}."
+            ) from None
+
     def check(self, message: object) -> None:
         """Raise UsageError for what is no message of this type, which may be that of another registry."""
         found = getattr(message, "__msgtype__", None)

@@ -171,10 +171,10 @@ def test_a_function_that_was_given_up_gets_no_mutex(
     assert mutex.try_lock("somebody")
 
 
-@pytest.mark.parametrize("limit_ms", [0, -1, float("inf"), float("nan")])
+@pytest.mark.parametrize("limit_ms", [0, -1, float("inf"), float("nan"), 1e30, "20"])
 def test_a_limit_that_cannot_be(limit_ms: float) -> None:
     board = small_board(PROFILE)
-    with pytest.raises(UsageError, match=r"limit_ms=.* of callback 'a': write a time above 0"):
+    with pytest.raises(UsageError, match=r"limit_ms of callback 'a' is .*: write a time above 0"):
         Executor(board, 1, 0).add_sw_callback("a", SUB, Tickets(board), lambda _, __: 0, limit_ms=limit_ms)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import pytest
 from small_board import Tickets, ignore, small_board, small_profile
 
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from small_board import Steps
 
     from reconros_zenoh.board.callback import HardwareThread
+    from reconros_zenoh.board.profile import Profile
     from reconros_zenoh.board.software import SoftwareContext
 
 SUB = CallbackKind.SUB
@@ -179,7 +181,43 @@ def test_without_any_time_it_is_refused(hardware: bool) -> None:
         add("walk", kind=SUB, source=Tickets(board), **{"thread" if hardware else "function": how})
 
 
-@pytest.mark.parametrize("make", [lambda: Cycles(-1), lambda: Native(0), lambda: Native(float("nan"))])
-def test_a_time_that_cannot_be(make: Any) -> None:
-    with pytest.raises(UsageError, match="write"):
-        make()
+@pytest.mark.parametrize("number", [np.uint8, np.int32, np.uint32, np.float32])
+def test_cycles_from_a_number_of_a_message(number: Any) -> None:
+    def as_long_as_the_message_says(thread: HardwareThread) -> Steps:
+        yield from thread.compute(int)
+        yield from thread.compute_cycles(number(200))
+
+    board = board_with_slots(1_000_000)
+    assert hardware_ns(board, Cycles(number(100)), as_long_as_the_message_says) == 300_000
+
+
+NO_CYCLES = (-1, "10", None, float("nan"), float("inf"))
+
+
+@pytest.mark.parametrize("count", NO_CYCLES)
+def test_cycles_that_cannot_be(count: Any) -> None:
+    with pytest.raises(UsageError) as caught:
+        Cycles(count)
+    assert str(caught.value) == f"Cycles({count!r}): write 0 or more cycles."
+
+
+@pytest.mark.parametrize("count", NO_CYCLES)
+@pytest.mark.parametrize("profile", [PROFILE, read_profile("native")])
+def test_steps_of_cycles_that_cannot_be(count: Any, profile: Profile) -> None:
+    told = []
+
+    def computing_less_than_nothing(thread: HardwareThread) -> Steps:
+        try:
+            yield from thread.compute_cycles(count)
+        except UsageError as error:
+            told.append(str(error))
+
+    hardware_ns(small_board(profile, 1), Cycles(0), computing_less_than_nothing)
+    assert told == [f"compute_cycles({count!r}): write 0 or more cycles."]
+
+
+@pytest.mark.parametrize("factor", [0, -1, "2", None, float("nan"), float("inf")])
+def test_a_factor_that_cannot_be(factor: Any) -> None:
+    with pytest.raises(UsageError) as caught:
+        Native(factor)
+    assert str(caught.value) == f"Native({factor!r}): write a factor above 0."

@@ -14,6 +14,7 @@ from reconros_zenoh.mapping.graph import ComputationGraph, Side, Topic
 from reconros_zenoh.mapping.project_graph import OUTSIDE, read_project_graph, shared_slots
 from reconros_zenoh.project.loader import load_project
 from reconros_zenoh.project.mapping_file import CallbackMapping, ProjectMapping
+from reconros_zenoh.ros.type_registry import TypeRegistry
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -150,3 +151,35 @@ def test_the_shipped_project() -> None:
         TO_OUTSIDE: SW,
     }
     assert Topic("/image_raw", (FROM_OUTSIDE,), ("/sobel_node",)) in graph.topics
+
+
+SIZED = """\
+[General]
+Name = sized
+
+[ResourceGroup@talk]
+node = rosnode, "/talk"
+word_msg = rosmsg, std_msgs, msg, UInt32
+text_msg = rosmsg, std_msgs, msg, String
+list_msg = rosmsg, std_msgs, msg, UInt8MultiArray
+pose_msg = rosmsg, geometry_msgs, msg, PoseWithCovariance
+word = rospub, node, word_msg, "/word"
+text = rospub, node, text_msg, "/text"
+list = rospub, node, list_msg, "/list"
+pose = rospub, node, pose_msg, "/pose"
+"""
+
+
+def test_a_topic_has_the_size_of_its_messages_where_all_are_of_one(tmp_path: Path) -> None:
+    configuration = read(tmp_path, SIZED)
+    graph = read_project_graph(configuration, ProjectMapping.default(configuration), TypeRegistry())
+    sizes = {topic.name: topic.size for topic in graph.topics}
+    assert sizes == {"/word": 4 + 4, "/text": None, "/list": None, "/pose": 4 + (7 + 36) * 8}
+    assert {topic.size for topic in graph_of(tmp_path, SIZED).topics} == {None}
+
+
+def test_a_size_needs_a_type_that_somebody_defines(tmp_path: Path) -> None:
+    configuration = read(tmp_path, SIZED.replace("String", "Strign"))
+    mapping = ProjectMapping.default(configuration)
+    with pytest.raises(FileError, match=r"build\.cfg:11: text: The type 'std_msgs/msg/Strign' is not known"):
+        read_project_graph(configuration, mapping, TypeRegistry())

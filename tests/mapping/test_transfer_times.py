@@ -146,7 +146,7 @@ def test_one_subscriber_in_hardware_never_pays_for_a_gateway(profile_file: Path)
 def test_without_a_size_the_rule_decides_and_the_changeover_is_told(profile_file: Path) -> None:
     prediction = predict(graph_of("h", "ijs", None), profile_file).topics["A"]
     assert prediction.decision.mapping is GATEWAY
-    assert "No size is given" in prediction.decision.reason
+    assert "No size is known" in prediction.decision.reason
     assert (prediction.smt, prediction.gateway) == (None, None)
     assert prediction.changeover is not None
     assert prediction.changeover.size == pytest.approx(45_000, rel=0.01)
