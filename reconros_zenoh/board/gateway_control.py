@@ -11,7 +11,7 @@ from reconros_zenoh.board.answers import VERSION, GatewayAnswer
 from reconros_zenoh.board.control import ask, gateways
 from reconros_zenoh.errors import UsageError
 from reconros_zenoh.ros.graph import EndpointToken, parse, tokens_expression
-from reconros_zenoh.ros.names import dds_type_name, resolve
+from reconros_zenoh.ros.names import resolve, type_name_of
 from reconros_zenoh.ros.qos import QosProfile
 
 if TYPE_CHECKING:
@@ -138,6 +138,9 @@ def check_type(transport: Transport, domain: int, topic: str, type_name: str) ->
     for key in transport.tokens(tokens_expression(domain), _LOOK_NS):
         token = parse(key)
         if isinstance(token, EndpointToken) and token.name == topic:
-            wanted = dds_type_name(type_name)
-            if token.dds_type != wanted:
-                raise UsageError(f"the topic {topic} has the type {token.dds_type}, not {wanted}.")
+            found = type_name_of(token.dds_type)
+            if found != type_name:
+                raise UsageError(
+                    f"the topic {topic} has the type {found}, not {type_name}. Give its type, or another "
+                    "topic."
+                )

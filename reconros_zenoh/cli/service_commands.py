@@ -105,6 +105,9 @@ def _board_plan(
     try:
         project = projects(given["project"] or application_folder())
         mapping, profile = project.mapping(given["mapping"]), project.profile(given["profile"])
+        options = BoardOptions(
+            given["name"], given["domain"], given["seed"], given["bitstreams"], trace=given["trace"]
+        )
     except FileError:
         raise
     except UsageError as error:
@@ -114,9 +117,6 @@ def _board_plan(
             f"runs on {profile.name}, which models nothing: nothing would take any virtual time.",
             "Give another --profile.",
         )
-    options = BoardOptions(
-        given["name"], given["domain"], given["seed"], given["bitstreams"], trace=given["trace"]
-    )
     return BoardPlan(profile, project, mapping, options)
 
 

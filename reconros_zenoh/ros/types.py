@@ -76,7 +76,7 @@ class MessageType:
             owner = owner.nested(form[1]) if owner and form[0] == Nodetype.NAME else None
         return form
 
-    def message(self, **fields: object) -> Any:
+    def message(self, /, **fields: object) -> Any:
         """Return a message with these fields; raise UsageError unless they are those of the type."""
         try:
             return self.cls(**fields)

@@ -23,7 +23,7 @@ _KINDS: Mapping[str, tuple[type, ...]] = {"b": (bool,), "i": (int,), "u": (int,)
 
 def zero_message(message_type: MessageType) -> Any:
     """Return the message whose numbers are 0, whose strings and sequences are empty."""
-    return message_type.message(**{name: _zero(message_type, form) for name, form in message_type.fields})
+    return message_type.cls(**{name: _zero(message_type, form) for name, form in message_type.fields})
 
 
 def message_of(message_type: MessageType, fields: Mapping[str, Any]) -> Any:

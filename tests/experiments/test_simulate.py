@@ -285,6 +285,7 @@ def test_clients_of_a_group_begin_together() -> None:
         ([BOARD, "reconros client painter"], r"services\.s1\.command cannot be run: .*'painter'"),
         ([BOARD, "reconros client sort --requests 0"], r"services\.s1\.command cannot be run: .*--requests"),
         ([f"{BOARD} --mapping=nowhere"], r"services\.s0\.command cannot be run: no mapping named 'nowhere'"),
+        ([f"{BOARD} --name=a+b"], r"file\.yaml:3: services\.s0\.command cannot be run: 'a\+b' cannot name"),
         ([f"{BOARD} --profile=nothing"], r"services\.s0\.command cannot be run: .*nothing"),
         ([f"{BOARD} --profile=native"], r"services\.s0\.command runs on native"),
         ([f"{BOARD} {ECHO}"], r"services\.s0\.command runs on native"),

@@ -72,6 +72,13 @@ MISTAKES = {
         "main.py:8",
         "no resource 'tick' in its groups",
     ),
+    "callback without a group": (
+        "build.cfg",
+        "ResourceGroup = count",
+        "",
+        "main.py:8",
+        "no resource 'timer' in its groups: none. Correct the name, or `ResourceGroup` of [ReconosThread@count]",
+    ),
     "resource that makes nothing ready": (
         "main.py",
         '"timer"',
