@@ -175,6 +175,12 @@ def test_a_histogram_of_nothing() -> None:
         rz.histogram([np.nan])
 
 
+@pytest.mark.parametrize("times", [["fast"], [[1], [2, 3]], {"a": 1}, [1, np.inf], [1, -np.inf]])
+def test_a_histogram_of_what_are_no_times(times: Any) -> None:
+    with pytest.raises(rz.UsageError, match=r"are no times: .* Give numbers|Give NaN for an answer that did"):
+        rz.histogram(times)
+
+
 NO_TIMES = (0, -1, 1e-10, np.nan, np.inf, 1e30, "1", None)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import reprlib
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -27,9 +28,17 @@ class NotebookFigure(Figure):
 
 
 def histogram(times_ms: npt.ArrayLike, title: str = "", bins: int = 40) -> Figure:
-    """Return a histogram of times [ms], with mean and median; NaN stands for a lost answer."""
-    values_ms = np.asarray(times_ms, np.float64).reshape(-1)
+    """Return a histogram of times [ms], with mean and median; NaN stands for a lost answer.
+
+    Raises UsageError for what are no times, and where all answers are lost.
+    """
+    try:
+        values_ms = np.asarray(times_ms, np.float64).reshape(-1)
+    except (TypeError, ValueError) as error:
+        raise UsageError(f"{reprlib.repr(times_ms)} are no times: {error}. Give numbers [ms].") from None
     known = values_ms[~np.isnan(values_ms)]
+    if not np.isfinite(known).all():
+        raise UsageError("a time without end cannot be drawn. Give NaN for an answer that did not come.")
     if not known.size:
         raise UsageError("a histogram of no times cannot be drawn. Measure some first.")
     record = Record(title, known, lost=values_ms.size - known.size)

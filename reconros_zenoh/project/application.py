@@ -190,8 +190,9 @@ class Application:
         group = next((group for group in groups if (group, resource) in self._resources), None)
         if group is None:
             raise UsageError(
-                f"callback {name!r} has no resource {resource!r} in its groups: {', '.join(groups) or 'none'}. "
-                f"Correct the name, or `ResourceGroup` of [ReconosThread@{name}] in build.cfg."
+                f"callback {name!r} has no resource {resource!r} in its groups: "
+                f"{', '.join(groups) or 'none'}. Correct the name, or `ResourceGroup` of "
+                f"[ReconosThread@{name}] in build.cfg."
             )
         source = self.source(group, resource, qos)
         kind = _required(source.kind)

@@ -77,7 +77,7 @@ MISTAKES = {
         "ResourceGroup = count",
         "",
         "main.py:8",
-        "no resource 'timer' in its groups: none. Correct the name, or `ResourceGroup` of [ReconosThread@count]",
+        "in its groups: none. Correct the name, or `ResourceGroup` of [ReconosThread@count] in build.cfg.",
     ),
     "resource that makes nothing ready": (
         "main.py",
