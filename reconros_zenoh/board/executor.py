@@ -153,7 +153,10 @@ class Executor:
         served = {slot.slot_id for slot in self._slots}
         for slot in slots:
             if slot not in served:
-                raise UsageError(f"callback {name!r} needs slot {slot}, which no hardware worker serves.")
+                raise UsageError(
+                    f"callback {name!r} needs slot {slot!r}, which no hardware worker serves. They serve "
+                    f"{', '.join(map(str, sorted(served))) or 'none'}."
+                )
             time = hardware_time(self.board.profile, name, timing, self.board.slots[slot].clock_hz)
             self.board.slots[slot].admit(name)
             self._register(name, kind, source, check).slots[slot] = (
@@ -288,6 +291,12 @@ class Executor:
     def _register(
         self, name: str, kind: CallbackKind, source: Source, check: Callable[[Any], None] | None
     ) -> _Registration:
+        for other, registration in self._registrations.items():
+            if registration.source is source and other != name:
+                raise UsageError(
+                    f"callbacks {other!r} and {name!r} have one source, which makes one callback ready. Give "
+                    "each its own."
+                )
         registration = self._registrations.setdefault(name, _Registration(kind, source, check))
         if registration.source is not source:
             raise UsageError(f"callback {name!r} is registered already with another source.")

@@ -29,13 +29,18 @@ Decode: TypeAlias = "Callable[[bytes | memoryview], tuple[Any, int]]"
 ENCODE_ERRORS = (AttributeError, TypeError, ValueError, OverflowError, struct.error)
 DECODE_ERRORS = (ValueError, IndexError, struct.error)
 
+
+class FieldError(TypeError):
+    """A field that does not fit, by its name."""
+
+
 _ZEROS = [bytes(count) for count in range(8)]
 
 
 def encoder(store: Typestore, type_name: str) -> Encode:
     """Return a function from a message to its payload; an array of numbers at the end stays apart.
 
-    It raises one of ENCODE_ERRORS for fields that do not fit.
+    It raises one of ENCODE_ERRORS for fields that do not fit, FieldError if it knows which.
     """
     function: Encode = _Encoder(store).function(type_name)
     return function
@@ -241,4 +246,4 @@ def _check_bool(label: str, value: object) -> None:
 
 
 def _refuse(problem: str) -> NoReturn:
-    raise TypeError(problem)
+    raise FieldError(problem)

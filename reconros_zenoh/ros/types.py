@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Any
 from rosbags.interfaces import Nodetype
 
 from reconros_zenoh.errors import BadMessageError, UsageError
-from reconros_zenoh.ros.cdr import DECODE_ERRORS, ENCODE_ERRORS, decoder, encoder
+from reconros_zenoh.ros.cdr import DECODE_ERRORS, ENCODE_ERRORS, FieldError, decoder, encoder
 from reconros_zenoh.ros.cdr_generator import ENCAPSULATION, fields_of
 from reconros_zenoh.ros.message_arrays import is_unchanging
 from reconros_zenoh.ros.names import dds_type_name
+from reconros_zenoh.ros.zero_message import zero_message
 
 if TYPE_CHECKING:
     from rosbags.interfaces.typing import FieldDesc
@@ -110,8 +111,9 @@ class MessageType:
             payload, array = self._encode(message)
         except ENCODE_ERRORS as error:
             raise UsageError(
-                f"A message of type {self.name} cannot be serialised: {error}. Give every field a value of "
-                "its type, and arrays of numbers as one-dimensional numpy arrays of the dtype of the field."
+                f"A message of type {self.name} cannot be serialised: {self.misfit(message, error)}. "
+                "Give every field a value of its type, and arrays of numbers as one-dimensional numpy arrays of "
+                "the dtype of the field."
             ) from error
         if array is None:
             return (payload,)
@@ -121,6 +123,24 @@ class MessageType:
         if not (joined_at_once or is_unchanging(array)):
             content = bytes(content)
         return payload, content
+
+    def misfit(self, message: Any, error: Exception) -> str:
+        """Return which field `encode` does not take, and why.
+
+        `error` says so itself only of some fields: numbers are packed together.
+        """
+        if isinstance(error, FieldError):
+            return str(error)
+        for name, form in self.fields:
+            alone, value = zero_message(self), getattr(message, name)
+            setattr(alone, name, value)
+            try:
+                self._encode(alone)
+            except ENCODE_ERRORS as its_error:
+                if form[0] == Nodetype.NAME and getattr(value, "__msgtype__", None) == form[1]:
+                    return self.nested(form[1]).misfit(value, its_error)
+                return f"field {name!r} of {self.name} is {reprlib.repr(value)}: {its_error}"
+        return str(error)
 
     def decode(self, payload: bytes | memoryview) -> Any:
         """Return the message that `payload` encodes; its arrays of numbers are views of `payload`.

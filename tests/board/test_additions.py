@@ -204,9 +204,12 @@ def test_a_callback_in_two_places_has_one_kind_and_one_check() -> None:
 
 def test_a_source_makes_one_callback_ready() -> None:
     board = small_board(small_profile(dict.fromkeys("ab", (10, 10))))
-    executor = Executor(board, 1, 0)
+    executor, other = Executor(board, 1, 0), Executor(board, 1, 0)
     source = Tickets(board)
-    for name in "ab":
-        executor.add_sw_callback(name, SUB, source, ignore)
+    executor.add_sw_callback("a", SUB, source, ignore)
+    with pytest.raises(UsageError, match="callbacks 'a' and 'b' have one source, which makes one callback r"):
+        executor.add_sw_callback("b", SUB, source, ignore)
+    other.add_sw_callback("b", SUB, source, ignore)
+    executor.spin()
     with pytest.raises(UsageError, match="one source cannot make two callbacks ready"):
-        executor.spin()
+        other.spin()

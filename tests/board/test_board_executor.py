@@ -98,7 +98,9 @@ def test_everything_else_that_can_be_called_is_a_software_callback(function: Any
 
 def test_a_hardware_callback_needs_a_slot_that_a_worker_serves() -> None:
     board = small_board(PROFILE, 2)
-    with pytest.raises(UsageError, match="'a' needs slot 1, which no hardware worker serves"):
+    with pytest.raises(
+        UsageError, match=r"'a' needs slot 1, which no hardware worker serves\. They serve 0\."
+    ):
         Executor(board, 0, 1).add_hw_callback("a", [0, 1], SUB, Tickets(board), logging_thread([], "a"))
 
 

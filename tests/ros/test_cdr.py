@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 import tracemalloc
+from operator import attrgetter
 from typing import TYPE_CHECKING, Any
 from unittest import mock
 
@@ -284,8 +286,30 @@ def test_a_field_that_does_not_fit_is_a_usage_error(array: Any) -> None:
 @pytest.mark.parametrize("value", [-1, 2**32, 1.5, "1", None])
 def test_a_number_that_does_not_fit_is_a_usage_error(value: Any) -> None:
     kind = REGISTRY.message("std_msgs/UInt32")
-    with pytest.raises(UsageError, match="cannot be serialised"):
+    told = f"cannot be serialised: field 'data' of std_msgs/msg/UInt32 is {value!r}: "
+    with pytest.raises(UsageError, match=re.escape(told)):
         kind.encode(kind.cls(value))
+
+
+POSE = REGISTRY.message("geometry_msgs/PoseStamped")
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "told"),
+    [
+        ("pose.position.y", "1", "field 'y' of geometry_msgs/msg/Point is '1': required argument"),
+        ("header.stamp.sec", 2**40, "field 'sec' of builtin_interfaces/msg/Time is 1099511627776: "),
+        ("header.frame_id", 7, "field 'frame_id' of std_msgs/msg/Header is 7: 'int' object has no"),
+        ("header.stamp", None, "field 'stamp' of std_msgs/msg/Header is None: "),
+        ("pose", POSE.cls, "field 'pose' of geometry_msgs/msg/PoseStamped is <class "),
+    ],
+)
+def test_the_field_of_a_value_that_does_not_fit_is_named(path: str, value: Any, told: str) -> None:
+    message = zero_message(POSE)
+    owner, _, name = path.rpartition(".")
+    setattr(attrgetter(owner)(message) if owner else message, name, value)
+    with pytest.raises(UsageError, match=f"PoseStamped cannot be serialised: {told}"):
+        POSE.encode(message)
 
 
 @pytest.mark.parametrize("value", [True, False, np.bool_(True)])
@@ -303,7 +327,7 @@ def test_what_is_true_or_false_is_no_bool(value: Any) -> None:
 
 def test_a_number_beyond_those_of_its_type_is_a_usage_error() -> None:
     kind = REGISTRY.message("std_msgs/Float32")
-    with pytest.raises(UsageError, match="cannot be serialised: float too large"):
+    with pytest.raises(UsageError, match=r"'data' of std_msgs/msg/Float32 is 1e.300: float too large"):
         kind.encode(kind.cls(1e300))
 
 
