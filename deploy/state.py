@@ -11,6 +11,7 @@ import struct
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING
 
 from reconros_zenoh.errors import FileError, UsageError
@@ -71,7 +72,7 @@ class StateFolder:
             except BlockingIOError:
                 raise UsageError(
                     f"{self._compose_file} is up already; its logs are in {self.logs}. "
-                    f"Stop it first: reconros down -f {self._compose_file}"
+                    f"Stop it first: reconros down -f {quote(str(self._compose_file))}"
                 ) from None
             # Stands until `leave` replaces it, so it tells what is true if that never happens.
             self.leave({}, "The process that ran it was killed, or found no room to write how it ended.")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from shlex import quote
 from typing import Annotated
 
 import typer
@@ -17,4 +18,4 @@ def new(name: Annotated[Path, typer.Argument(metavar="NAME", help="The project, 
     """
     for path in new_project(name):
         print(path)
-    print(f"Try it: reconros run {name} --clock virtual")
+    print(f"Try it: reconros run {quote(str(name))} --clock virtual")

@@ -6,6 +6,7 @@ import json
 import os
 import sys
 from pathlib import Path  # typer reads the annotations at run time
+from shlex import quote
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -60,7 +61,8 @@ def up(
     if failure is not None:
         raise failure
     if detach:
-        console.print(f"{file} is up, its logs are in {folder.logs}. Stop it with: reconros down -f {file}")
+        stop = f"reconros down -f {quote(str(file))}"
+        console.print(f"{file} is up, its logs are in {folder.logs}. Stop it with: {stop}")
 
 
 def down(

@@ -112,8 +112,8 @@ class MessageType:
         except ENCODE_ERRORS as error:
             raise UsageError(
                 f"A message of type {self.name} cannot be serialised: {self.misfit(message, error)}. "
-                "Give every field a value of its type, and arrays of numbers as one-dimensional numpy arrays of "
-                "the dtype of the field."
+                "Give every field a value of its type, and arrays of numbers as one-dimensional numpy arrays "
+                "of the dtype of the field."
             ) from error
         if array is None:
             return (payload,)

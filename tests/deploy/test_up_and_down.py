@@ -169,6 +169,17 @@ def test_down_stops_what_up_has_left_running(services: Services, run: Run) -> No
     )
 
 
+def test_how_to_stop_it_can_be_given_to_a_shell(services: Services, run: Run) -> None:
+    _server_and(services, "block()")
+    (services.folder / "compose.yaml").rename(file := services.folder / "my garden.yaml")
+    up, again = run("up", "-d", file=file), run("up", file=file)
+    down = run("down", file=file)
+    assert f"Stop it with: reconros down -f '{file}'" in up.stdout.replace("\n", " ")
+    assert f"Stop it first: reconros down -f '{file}'" in again.stderr
+    assert down.returncode == 0
+    services.assert_gone()
+
+
 def test_down_without_a_file_stops_the_one_that_is_running(
     services: Services, run: Run, tmp_path: Path
 ) -> None:

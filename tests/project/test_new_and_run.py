@@ -56,6 +56,11 @@ def blink(tmp_path: Path) -> Path:
     return tmp_path / "blink"
 
 
+def test_what_to_try_can_be_given_to_a_shell(tmp_path: Path) -> None:
+    folder = tmp_path / "my robots" / "blink"
+    assert f"Try it: reconros run '{folder}' --clock virtual" in invoke("new", folder)
+
+
 def test_a_new_project_is_complete_and_clean(blink: Path) -> None:
     assert sorted(str(path.relative_to(blink)) for path in blink.rglob("*") if path.is_file()) == [
         "build.cfg",
