@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import reprlib
 from dataclasses import dataclass
 from functools import cached_property, partial
 from operator import attrgetter
@@ -14,7 +15,7 @@ from reconros_zenoh.board.delegate_calls import DelegateCalls
 from reconros_zenoh.board.host import measured
 from reconros_zenoh.board.noted_calls import noted
 from reconros_zenoh.board.timing import Native, check_cycles, cycles_ns
-from reconros_zenoh.errors import PageFaultError
+from reconros_zenoh.errors import PageFaultError, UsageError
 from reconros_zenoh.ros.forms import is_number, number
 from reconros_zenoh.ros.message_arrays import arrays_of, lies_in
 
@@ -194,12 +195,17 @@ class HardwareThread(DelegateCalls):
         The source is an array, such as a field of the message, or an address: then `size` bytes from there on
         come as numbers of `dtype`. A message that came over a hardware-mapped topic is in the slot already:
         its arrays, views of them, and its blocks at their addresses cost nothing, copies and all else do.
-        Raises PageFaultError for bytes that are not all in one block of memory.
+        Raises PageFaultError for bytes that are not all in one block of memory, UsageError for what is
+        neither an array nor an address with a size.
         """
         if isinstance(source, np.ndarray):
             data: Array = source
         else:
-            assert size is not None
+            if size is None:
+                raise UsageError(
+                    f"mem_read of a {type(source).__name__} without a size: give an array, which of a field "
+                    'that is a number is message.array("field"), or an address and how many bytes.'
+                )
             source = int(source)
             # What the slot holds does not change with the memory.
             data = self._mapped(source, size).view(dtype).copy()
@@ -216,8 +222,12 @@ class HardwareThread(DelegateCalls):
 
         `to` is the address of its first byte, or the writer that will publish it: for a hardware-mapped topic
         it stays in the slot. Without `to` it is what the callback returns next. Raises PageFaultError for
-        bytes that are not all in one block of memory.
+        bytes that are not all in one block of memory, UsageError for what is no array.
         """
+        if not isinstance(data, (np.ndarray, np.generic)):
+            raise UsageError(
+                f"mem_write of {reprlib.repr(data)}: give an array, as np.array([1], np.uint32)."
+            )
         if isinstance(to, (int, np.integer, InitData)):
             content = np.ascontiguousarray(data).reshape(-1).view(np.uint8)
             try:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from reconros_zenoh.board.executor import Executor
 from reconros_zenoh.board.kernel import Kernel
 from reconros_zenoh.board.sources import ServiceSource, SubscriptionSource
 from reconros_zenoh.board.writers import TopicWriter
+from reconros_zenoh.errors import UsageError
 from reconros_zenoh.executor.callbacks import CallbackKind
 
 if TYPE_CHECKING:
@@ -158,6 +160,36 @@ def test_a_page_fault_fails_the_callback_and_the_board_goes_on(
         "lie in one block of its memory. Check the offset, the length and the pointer."
     )
     assert not case.board.memory._blocks
+
+
+NO_TRANSFERS = {
+    "a number": (
+        lambda thread, init: thread.mem_read(init.height),
+        r'mem_read of a int .* message\.array\("field"\), or an address',
+    ),
+    "an address alone": (lambda thread, init: thread.mem_read(init), "mem_read of a InitData without a size"),
+    "a list to read": (lambda thread, _: thread.mem_read([1, 2]), "mem_read of a list without a size"),
+    "a number to write": (lambda thread, init: thread.mem_write(5, init), "mem_write of 5: give an array"),
+    "a list to write": (lambda thread, _: thread.mem_write([1, 2]), r"mem_write of \[1, 2\]: give an array"),
+}
+
+
+@pytest.mark.parametrize(("transfer", "told"), NO_TRANSFERS.values(), ids=NO_TRANSFERS)
+def test_what_cannot_be_transferred_fails_the_callback_in_words(
+    transfer: Any, told: str, caplog: pytest.LogCaptureFixture
+) -> None:
+    def transfers(_: Filter) -> Any:
+        def callback(thread: HardwareThread) -> Steps:
+            yield from transfer(thread, (yield from thread.get_init_data()))
+
+        return callback
+
+    case = Filter(small_board(PROFILE, 1), transfers)
+    case.run(image())
+    (record,) = caplog.records
+    assert record.exc_info is not None
+    assert isinstance(record.exc_info[1], UsageError)
+    assert re.match(told, str(record.exc_info[1]))
 
 
 def test_a_message_with_a_broken_pointer_is_not_published(caplog: pytest.LogCaptureFixture) -> None:
