@@ -51,8 +51,7 @@ def check(
             raise refused
         configuration = files.configuration
     else:
-        configuration = read_build_cfg(project)
-        check_topics(configuration)
+        configuration = check_topics(read_build_cfg(project))
     if as_json:
         print(json.dumps(_as_json(configuration)))
         return

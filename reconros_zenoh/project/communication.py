@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
+from dataclasses import replace
 from itertools import product
 from typing import TYPE_CHECKING, TypeVar
 
@@ -57,8 +58,11 @@ def declared_type(path: Path, end: Resource | RosGateway, find: Callable[[str], 
         raise FileError(path, end.line, f"{end.name}: {error}") from error
 
 
-def check_topics(configuration: BuildConfiguration) -> None:
-    """Raise FileError at the line of the first topic or gateway that cannot be mapped as declared."""
+def check_topics(configuration: BuildConfiguration) -> BuildConfiguration:
+    """Return the configuration, with a warning for each gateway to a stream that has no end.
+
+    Raise FileError at the line of the first topic or gateway that cannot be mapped as declared.
+    """
     hardware: defaultdict[str, list[Resource]] = defaultdict(list)
     software: defaultdict[str, list[Resource]] = defaultdict(list)
     for resource in configuration.resources:
@@ -78,6 +82,13 @@ def check_topics(configuration: BuildConfiguration) -> None:
                     f"{_ENDS[end.type]} but no gateway to it.",
                     f"Declare a `[ROSGateway@name]` with `HWTopic = {topic}` and `SWTopic = {topic}`.",
                 )
+    unused = [
+        f"{configuration.path}:{gateway.line}: the gateway {gateway.name} has no use, because nobody has a "
+        f"hardware-mapped end of {pair.hmt}. There are ends of: {', '.join(hardware) or 'none'}."
+        for gateway, pair in zip(configuration.gateways, pairs, strict=True)
+        if pair.hmt not in hardware
+    ]
+    return replace(configuration, warnings=(*configuration.warnings, *unused))
 
 
 def check_types(configuration: BuildConfiguration, types: TypeRegistry) -> None:

@@ -210,8 +210,7 @@ def read_project(folder: Path) -> ProjectFiles:
             "is not there.",
             f"Give the folder of a project; relative paths, in a Compose file too, count from {Path.cwd()}.",
         )
-    configuration = read_build_cfg(folder / "build.cfg")
-    check_topics(configuration)
+    configuration = check_topics(read_build_cfg(folder / "build.cfg"))
     files = ProjectFiles(folder, configuration, read_interfaces(folder))
     check_fifos(configuration, files.types)
     return files

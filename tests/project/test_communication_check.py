@@ -144,6 +144,17 @@ def test_a_gateway_lets_both_sides_have_the_same_name(tmp_path) -> None:
     check_topics(configuration(tmp_path, HW + SW + GATEWAY.format("g", "/a", "/a", "sensor_msgs/Image")))
 
 
+def test_a_gateway_to_a_stream_without_an_end_is_a_warning(tmp_path) -> None:
+    used = GATEWAY.format("g", "/a", "/b", "sensor_msgs/Image")
+    read = configuration(tmp_path, HW + used)
+    assert check_topics(read).warnings == read.warnings
+    read = configuration(tmp_path, HW + GATEWAY.format("g", "/aa", "/b", "sensor_msgs/Image"))
+    assert check_topics(read).warnings[-1] == (
+        f"{tmp_path / 'build.cfg'}:10: the gateway g has no use, because nobody has a hardware-mapped end of "
+        "/aa. There are ends of: /a."
+    )
+
+
 def test_a_callback_at_a_stream_may_only_be_mapped_to_slots(tmp_path) -> None:
     read = configuration(tmp_path, HW + THREAD)
     check_places(read, {"t": CallbackMapping(slots=(0,))})
