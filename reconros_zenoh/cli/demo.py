@@ -35,28 +35,28 @@ def demo(
     console = wide_console()
     runs = []
     ablation = None
-    for clock, requests in ((ClockName.WALL, wall_requests), (ClockName.VIRTUAL, virtual_requests)):
-        planned = plan(clock, MAPPINGS, requests, 0, out, _PROFILE)
-        experiment = run(planned, quiet=False)
-        show(console, experiment)
-        if experiment["mappings"]:
-            runs.append(load_run(planned.folder))
-        if ended := experiment["interrupted"]:
-            break
-    else:
-        total = runs_of_ablation(planned.mappings)
-        with (
-            run_bar("what each mechanism is worth", total, quiet=False) as advance,
-            until_interrupted() as interruption,
-        ):
-            ablation = ablate(read_profile(_PROFILE), planned.mappings, _ABLATION_REQUESTS, advance)
-        ended = interruption.happened
+    with until_interrupted():  # a signal between two parts, while what was measured is shown
+        for clock, requests in ((ClockName.WALL, wall_requests), (ClockName.VIRTUAL, virtual_requests)):
+            planned = plan(clock, MAPPINGS, requests, 0, out, _PROFILE)
+            experiment = run(planned, quiet=False)
+            show(console, experiment)
+            if experiment["mappings"]:
+                runs.append(load_run(planned.folder))
+            if experiment["interrupted"]:
+                break
+        else:
+            total = runs_of_ablation(planned.mappings)
+            with (
+                run_bar("what each mechanism is worth", total, quiet=False) as advance,
+                until_interrupted(),
+            ):
+                ablation = ablate(read_profile(_PROFILE), planned.mappings, _ABLATION_REQUESTS, advance)
     if not runs:
         raise interrupted(quiet=False, measured=False)
     experiments, records = zip(*runs, strict=True)
     report = out / "report.html"
     write_report(report, experiments, records, ablation)
     print(f"report: {report}")
-    if ended:
+    if ablation is None:
         raise interrupted(quiet=False)
     raise typer.Exit(0 if all(map(all_right, experiments)) else 1)

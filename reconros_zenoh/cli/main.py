@@ -5,20 +5,17 @@ from __future__ import annotations
 import importlib
 import json
 import logging
-import math
 import signal
 import sys
-import time
 from typing import NoReturn
 
 import typer
 
 from reconros_zenoh.cli.printable import printable
 from reconros_zenoh.cli.streams import drop_output, open_streams
-from reconros_zenoh.clock.signals import ending_signals
+from reconros_zenoh.clock.signals import EndingHandler, ending_signals
 from reconros_zenoh.errors import ReconrosError, TransportError, UsageError
 
-_FINISHING_S = 5.0
 _LONGEST_LINE = 2000
 
 _VERBS = {
@@ -58,7 +55,7 @@ def main() -> None:
     open_streams()
     _log_to_stderr()
     logging.getLogger("matplotlib").setLevel(logging.ERROR)  # where its fonts are is nobody's concern
-    ending = _Ending()
+    ending = EndingHandler()
     endings = ending_signals()
     for number in endings:
         signal.signal(number, ending)
@@ -141,20 +138,3 @@ def _log_to_stderr() -> None:
     handler = logging.StreamHandler()
     handler.setFormatter(Formatter())
     logging.basicConfig(level=logging.INFO, handlers=[handler])
-
-
-class _Ending:
-    """Ends on SIGTERM and SIGHUP as on Ctrl-C: through every `finally`.
-
-    For some seconds further signals are ignored, so that what was measured can be written: a second Ctrl-C,
-    or the second signal of `timeout`, which sends one to the process and one to its group.
-    """
-
-    def __init__(self) -> None:
-        self._ignored_until_s = -math.inf
-
-    def __call__(self, *_: object) -> None:
-        now_s = time.monotonic()
-        if now_s >= self._ignored_until_s:
-            self._ignored_until_s = now_s + _FINISHING_S
-            raise KeyboardInterrupt

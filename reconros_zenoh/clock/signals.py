@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import _thread
+import math
 import signal
 import threading
+import time
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, cast
 
@@ -15,12 +17,49 @@ ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 """Ctrl-C, the signal of `kill`, and that of a terminal that closes."""
 
 _LONGEST_EVENT_S = 1.0
+_FINISHING_S = 5.0
 
 
 def ending_signals() -> tuple[signal.Signals, ...]:
     """Return the signals that end this process: not SIGHUP where that is ignored, as with `nohup`."""
     kept = {signal.SIGHUP} if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN else set()
     return tuple(number for number in ENDING if number not in kept)
+
+
+class EndingHandler:
+    """Ends a command by KeyboardInterrupt, on SIGTERM and SIGHUP, too: through every `finally`.
+
+    For some seconds further signals are ignored, so that what was measured can be written: a second Ctrl-C,
+    or the second signal of `timeout`, which sends one to the process and one to its group. Between `hold` and
+    `release` the first one waits.
+    """
+
+    def __init__(self) -> None:
+        self._ignored_until_s = -math.inf
+        self._held = False
+        self._waits = False
+
+    def __call__(self, *_: object) -> None:
+        """Raise KeyboardInterrupt, or not, as described above."""
+        now_s = time.monotonic()
+        if now_s < self._ignored_until_s:
+            return
+        first = self._ignored_until_s == -math.inf
+        self._ignored_until_s = now_s + _FINISHING_S
+        if not (self._held and first):
+            raise KeyboardInterrupt
+        self._waits = True
+
+    def hold(self) -> None:
+        """From now on a first signal waits, and only another one, some seconds later, raises."""
+        self._held = True
+
+    def release(self) -> None:
+        """From now on the first signal raises; raise KeyboardInterrupt if one waits."""
+        self._held = False
+        if self._waits:
+            self._waits = False
+            raise KeyboardInterrupt
 
 
 @contextmanager

@@ -7,11 +7,10 @@ noted his time: on few cores the checks would be in each other's way.
 
 from __future__ import annotations
 
-import multiprocessing
 import statistics
 import time
 from collections import defaultdict
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import ExitStack
 from functools import partial
 from itertools import product
 from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar, get_args
@@ -19,7 +18,8 @@ from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar, get_args
 from reconros_zenoh.errors import ExperimentError
 from reconros_zenoh.experiments.gateway import Cell, Times, Variant
 from reconros_zenoh.experiments.gateway_processes import run_board, run_listener, run_publisher
-from reconros_zenoh.experiments.interruption import terminal_signals_blocked, until_interrupted
+from reconros_zenoh.experiments.interruption import until_interrupted
+from reconros_zenoh.experiments.processes import Processes, receive, send
 from reconros_zenoh.experiments.provenance import host
 from reconros_zenoh.experiments.wall import free_port
 from reconros_zenoh.mapping.graph import Side
@@ -27,7 +27,7 @@ from reconros_zenoh.transport.zenoh import ZenohRouter
 from reconros_zenoh.transport.zenoh_session import has_shared_memory
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Mapping, Sequence
     from multiprocessing.connection import Connection
 
     from reconros_zenoh.experiments.gateway_processes import Receipt
@@ -53,6 +53,7 @@ _THROUGH_SOCKETS = (
 
 K = TypeVar("K")
 _LIMIT_S = 20.0
+_CLOSING_S = 3.0
 _WARM_UP = 5
 _SITTINGS = 2
 _LOST_S = 2.0
@@ -99,7 +100,7 @@ def measure_native(
 
 
 def _begin_cell(
-    routers: Mapping[Variant, str], size: int, count: int, processes: ExitStack
+    routers: Mapping[Variant, str], size: int, count: int, processes: Processes
 ) -> Mapping[Variant, Setup]:
     return {
         variant: native_setup(processes, router, variant, size, count) for variant, router in routers.items()
@@ -114,12 +115,13 @@ class Setup:
     publishes the message whose number it is sent.
     """
 
-    def __init__(self, processes: ExitStack, receivers: Iterable[Role], source: Role) -> None:
-        """Start the processes and wait until messages get through; they end with the stack."""
-        self._receivers = [processes.enter_context(_process(role)) for role in receivers]
+    def __init__(self, processes: Processes, receivers: Iterable[Role], source: Role) -> None:
+        """Start the processes and wait until messages get through; they end with `processes`."""
+        self._receivers = [processes.start(function, *arguments) for function, arguments in receivers]
         for receiver in self._receivers:
-            _receive(receiver, time.monotonic() + _LIMIT_S)
-        self._source = processes.enter_context(_process(source))
+            receive(receiver, time.monotonic() + _LIMIT_S)
+        function, arguments = source
+        self._source = processes.start(function, *arguments)
         self._number = _warm_up(self._source, self._receivers)
 
     def measure(self) -> tuple[int, int] | None:
@@ -136,7 +138,7 @@ class Setup:
         return max(times.values()), to_software_ns
 
 
-def native_setup(processes: ExitStack, router: str, variant: Variant, size: int, count: int) -> Setup:
+def native_setup(processes: Processes, router: str, variant: Variant, size: int, count: int) -> Setup:
     """Return the setup of a variant of a cell, in the network of its router."""
     return Setup(
         processes,
@@ -145,7 +147,7 @@ def native_setup(processes: ExitStack, router: str, variant: Variant, size: int,
     )
 
 
-def take_turns(begin: Callable[[ExitStack], Mapping[K, Setup]], repeat: int) -> dict[K, Times]:
+def take_turns(begin: Callable[[Processes], Mapping[K, Setup]], repeat: int) -> dict[K, Times]:
     """Return the medians of each setup; they take turns, so that what else this host does meets all.
 
     The processes are started anew several times: it depends on the order of joining whom Zenoh serves first.
@@ -153,7 +155,7 @@ def take_turns(begin: Callable[[ExitStack], Mapping[K, Setup]], repeat: int) -> 
     samples: defaultdict[K, list[tuple[int, int]]] = defaultdict(list)
     sittings = min(_SITTINGS, repeat)
     for sitting in range(sittings):
-        with ExitStack() as processes:
+        with Processes(_CLOSING_S) as processes:
             setups = begin(processes)
             for _ in range(repeat // sittings + (sitting < repeat % sittings)):
                 for name, setup in setups.items():
@@ -195,64 +197,19 @@ def _round(
     source: Connection, receivers: Sequence[Connection], number: int, limit_s: float
 ) -> dict[str, int]:
     """Return the transmission times [ns] by subscriber of a message, checked."""
-    _send(source, number)
+    send(source, number)
     times: dict[str, int] = {}
     deadline = time.monotonic() + limit_s
     for receiver in receivers:
         got: list[Receipt] = []
         while not got or got[0][1] < number:  # those of a message that came late
-            got = _receive(receiver, deadline)
+            got = receive(receiver, deadline)
         if any(receipt[1] != number for receipt in got):
             raise ExperimentError(f"instead of message {number} came {got}.")
         times.update({name: transmission_ns for name, _, transmission_ns in got})
     for receiver in receivers:
-        _send(receiver, "check")
-        problem = _receive(receiver, time.monotonic() + _LIMIT_S)
+        send(receiver, "check")
+        problem = receive(receiver, time.monotonic() + _LIMIT_S)
         if problem:
             raise ExperimentError(problem)
     return times
-
-
-def _send(connection: Connection, what: object) -> None:
-    try:
-        connection.send(what)
-    except ConnectionError:
-        raise _ended_early() from None
-
-
-def _receive(connection: Connection, deadline: float) -> Any:
-    try:
-        if not connection.poll(max(0.0, deadline - time.monotonic())):
-            raise TimeoutError
-        return connection.recv()
-    except (EOFError, ConnectionError):
-        raise _ended_early() from None
-
-
-def _ended_early() -> ExperimentError:
-    return ExperimentError("a process of the experiment ended early; its reason stands above.")
-
-
-@contextmanager
-def _process(role: Role) -> Iterator[Connection]:
-    """Run the role in a process of its own, which ends with the block."""
-    function, arguments = role
-    spawn = multiprocessing.get_context("spawn")
-    here, there = spawn.Pipe()
-    process = spawn.Process(target=_play, args=(function, there, *arguments), daemon=True)
-    with terminal_signals_blocked():
-        process.start()
-    there.close()
-    try:
-        yield here
-    finally:
-        here.close()
-        process.join(_LIMIT_S)
-        process.kill()  # one that is stopped (Ctrl-Z) would hear nothing else, and Python wait for its end
-        process.join()
-
-
-def _play(function: Callable[..., None], connection: Connection, *arguments: object) -> None:
-    """Run what the process is for, until it ends or nobody hears it any more."""
-    with suppress(ConnectionError):
-        function(connection, *arguments)

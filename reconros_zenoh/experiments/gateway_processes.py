@@ -23,6 +23,7 @@ from reconros_zenoh.clock.virtual import succeed_once
 from reconros_zenoh.clock.wall import WallEnvironment
 from reconros_zenoh.executor.callbacks import CallbackKind
 from reconros_zenoh.experiments.gateway import setup_mapping
+from reconros_zenoh.experiments.processes import commands
 from reconros_zenoh.mapping.graph import Side
 from reconros_zenoh.project.hosting import BoardOptions, HostedBoard
 from reconros_zenoh.project.loader import load_project
@@ -34,7 +35,7 @@ from reconros_zenoh.ros.type_registry import TypeRegistry
 from reconros_zenoh.transport.zenoh import ZenohTransport
 
 if TYPE_CHECKING:
-    from collections.abc import Generator, Iterator
+    from collections.abc import Generator
     from multiprocessing.connection import Connection
 
     from reconros_zenoh.board.callback import HardwareThread
@@ -170,12 +171,3 @@ def run_publisher(connection: Connection, router: str, size: int) -> None:
             image.header.frame_id = f"{number} {crc:08x}"
             set_stamp(image.header.stamp, time.monotonic_ns())
             publisher.publish(image)
-
-
-def commands(connection: Connection) -> Iterator[Any]:
-    """Yield what is asked for until nobody asks any more."""
-    while True:
-        try:
-            yield connection.recv()
-        except (EOFError, OSError):
-            return

@@ -4,21 +4,22 @@ from __future__ import annotations
 
 import os
 import threading
-from concurrent.futures import ProcessPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
-from multiprocessing import get_context, parent_process
-from typing import TYPE_CHECKING, NamedTuple, Self
+from collections import deque
+from multiprocessing import parent_process
+from multiprocessing.connection import wait
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from reconros_zenoh.errors import ExperimentError
-from reconros_zenoh.experiments.interruption import terminal_signals_blocked
+from reconros_zenoh.errors import ReconrosError
+from reconros_zenoh.experiments.processes import Processes, commands, receive, send
 from reconros_zenoh.experiments.roundtrip import CLIENTS
 from reconros_zenoh.experiments.virtual import run_clients
 from reconros_zenoh.measure.record import Record
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
+    from multiprocessing.connection import Connection
     from pathlib import Path
 
     from reconros_zenoh.board.profile import Profile
@@ -34,33 +35,35 @@ class Run(NamedTuple):
     seed: int
 
 
-class ParallelRuns:
-    """Processes that make runs; what comes out does not depend on how many there are.
+class ParallelRuns(Processes):
+    """Processes that make runs; what comes out does not depend on how many there are."""
 
-    They are started afresh rather than forked, because a process with a progress bar's thread cannot be
-    forked safely.
-    """
-
-    def __enter__(self) -> Self:
-        self._pool = ProcessPoolExecutor(os.cpu_count(), get_context("spawn"), _end_with_parent)
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._pool.shutdown(cancel_futures=True)
+    def __init__(self) -> None:
+        super().__init__(grace_s=0.0)  # there is nothing that they had to close
+        self._idle: list[Connection] = []
 
     def records(self, runs: Iterable[Run]) -> Iterator[dict[str, Record]]:
         """Yield the record of each client, run by run in the given order.
 
-        Raise ExperimentError if a process was ended from outside.
+        Raise what a run raises, and ExperimentError if a process was ended from outside.
         """
-        try:
-            with terminal_signals_blocked():
-                records = self._pool.map(records_of, runs)
-            yield from records
-        except BrokenProcessPool:
-            raise ExperimentError(
-                "a process of the simulation was ended from outside. Was there memory enough? Run it again."
-            ) from None
+        left = deque(enumerate(runs))
+        busy: dict[Connection, int] = {}
+        made: dict[int, dict[str, Record]] = {}
+        for number in range(len(left)):
+            while number not in made:
+                while left and len(busy) < (os.cpu_count() or 1):
+                    process = self._idle.pop() if self._idle else self.start(_make_runs)
+                    busy[process], run = left.popleft()
+                    send(process, run)
+                ready = wait(busy)
+                for process in [each for each in busy if each in ready]:
+                    answer = receive(process)
+                    if isinstance(answer, ReconrosError):
+                        raise answer
+                    made[busy.pop(process)] = answer
+                    self._idle.append(process)
+            yield made.pop(number)
 
 
 def pooled(records: Sequence[Mapping[str, Record]]) -> dict[str, Record]:
@@ -74,6 +77,16 @@ def pooled(records: Sequence[Mapping[str, Record]]) -> dict[str, Record]:
         )
         for client in records[0]
     }
+
+
+def _make_runs(connection: Connection) -> None:
+    """Answer each run with its records, or with what is wrong with it."""
+    _end_with_parent()
+    for run in commands(connection):
+        try:
+            connection.send(records_of(run))
+        except ReconrosError as error:
+            connection.send(error)
 
 
 def _end_with_parent() -> None:

@@ -23,7 +23,8 @@ from reconros_zenoh.applications.gateway.nodes import random_body
 from reconros_zenoh.clock.process import tune_process
 from reconros_zenoh.experiments.gateway import COUNTS, SIZES
 from reconros_zenoh.experiments.gateway_native import Setup, copies, native_setup, take_turns
-from reconros_zenoh.experiments.gateway_processes import Receiver, commands
+from reconros_zenoh.experiments.gateway_processes import Receiver
+from reconros_zenoh.experiments.processes import Processes, commands
 from reconros_zenoh.transport.zenoh import ZenohRouter
 
 if TYPE_CHECKING:
@@ -65,7 +66,7 @@ def raw_publisher(connection: Connection, router: str, size: int) -> None:
             publisher.put(HEADER.pack(number, time.monotonic_ns(), crc) + body)
 
 
-def raw_setup(processes: ExitStack, router: str, size: int, count: int) -> Setup:
+def raw_setup(processes: Processes, router: str, size: int, count: int) -> Setup:
     """Return the rival."""
     names = [f"hardware_{index}" for index in range(count)]
     return Setup(
@@ -78,7 +79,7 @@ def raw_setup(processes: ExitStack, router: str, size: int, count: int) -> Setup
 def measure(routers: list[str], size: int, count: int, repeat: int) -> dict[str, Any]:
     """Return one row."""
 
-    def begin(processes: ExitStack) -> dict[str, Setup]:
+    def begin(processes: Processes) -> dict[str, Setup]:
         return {
             "raw": raw_setup(processes, routers[0], size, count),
             "smt": native_setup(processes, routers[1], "smt", size, count),

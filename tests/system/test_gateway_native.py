@@ -5,21 +5,17 @@ from __future__ import annotations
 import itertools
 import json
 import multiprocessing
-import os
 import subprocess
 import sys
-from contextlib import ExitStack
-from signal import SIG_BLOCK, SIGHUP, SIGINT, SIGSTOP, pthread_sigmask
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import psutil
 import pytest
 
 from reconros_zenoh.errors import ExperimentError
-from reconros_zenoh.experiments import gateway_native
-from reconros_zenoh.experiments.gateway_native import Setup, _process, take_turns
+from reconros_zenoh.experiments.gateway_native import Setup, take_turns
 from reconros_zenoh.experiments.gateway_processes import Receiver
+from reconros_zenoh.experiments.processes import Processes
 
 if TYPE_CHECKING:
     from multiprocessing.connection import Connection
@@ -84,27 +80,6 @@ def test_a_receiver_reports_when_all_its_readers_have_a_message_and_checks_the_b
     assert here.recv() == "2 of 2 messages came with other bytes."
 
 
-def tell_signal_mask(connection: Connection) -> None:
-    connection.send(pthread_sigmask(SIG_BLOCK, ()))
-
-
-def test_its_processes_leave_the_signals_of_a_terminal_to_the_experiment() -> None:
-    with _process((tell_signal_mask, ())) as connection:
-        assert connection.recv() >= {SIGINT, SIGHUP}
-
-
-def stop(connection: Connection) -> None:
-    connection.send(os.getpid())
-    os.kill(os.getpid(), SIGSTOP)
-
-
-def test_a_process_that_is_stopped_does_not_outlive_the_experiment(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(gateway_native, "_LIMIT_S", 0.1)
-    with _process((stop, ())) as connection:
-        number = connection.recv()
-    assert not psutil.pid_exists(number)
-
-
 def test_too_many_lost_messages_end_the_experiment() -> None:
     class Losing:
         def measure(self) -> None:
@@ -132,7 +107,7 @@ def publish(connection: Connection, messages: int) -> None:
 @pytest.mark.parametrize("messages", [0, 5, 7])
 def test_a_process_that_dies_ends_the_experiment_with_a_reason(messages: int) -> None:
     def measure() -> None:
-        with ExitStack() as processes:
+        with Processes(1.0) as processes:
             setup = Setup(processes, [(receive, ())], (publish, (messages,)))
             while True:
                 setup.measure()
