@@ -105,12 +105,10 @@ class _Encoder(Generator):
 
     def _array(self, field: Field, element: FieldDesc, size: int | None, most: int) -> str:
         dtype = np.dtype(number(element).str)  # the very object that most arrays have
-        # A byte is a signed one as rosbags has it, and an unsigned one in C.
-        dtypes = (dtype, np.dtype("i1")) if element[1][0] == "byte" else (dtype,)
         array = self._variable(field.value)
         is_one = f"type({array}) is {self._constant(np.ndarray)} and {array}.dtype is {self._constant(dtype)}"
         self._write(f"if not ({is_one} and {array}.ndim == 1):")
-        arguments = f"{field.label!r}, {array}, {self._constant(dtypes)}"
+        arguments = f"{field.label!r}, {array}, {self._constant(dtype)}"
         self._write(f"    {self._constant(_check_array)}({arguments})")
         self._begin(field, array, size, most)
         self._align(dtype.itemsize, size, f"len({array})")
@@ -192,7 +190,7 @@ class _Decoder(Generator):
         return value
 
     def _array(self, field: Field, element: FieldDesc, size: int | None, most: int) -> str:
-        dtype = np.dtype("i1") if element[1][0] == "byte" else number(element)
+        dtype = number(element)
         count = self._count(field, size, most)
         self._align(dtype.itemsize, size, count)
         arguments = f"given, {self._constant(dtype)}, {count}, at"
@@ -226,11 +224,11 @@ class _Decoder(Generator):
         return count
 
 
-def _check_array(label: str, array: Any, dtypes: tuple[np.dtype[Any], ...]) -> None:
+def _check_array(label: str, array: Any, dtype: np.dtype[Any]) -> None:
     is_array = isinstance(array, np.ndarray)
-    if not is_array or array.dtype not in dtypes:
+    if not is_array or array.dtype != dtype:
         found = f"an array of {array.dtype}" if is_array else f"a {type(array).__name__}"
-        _refuse(f"{label} is {found}, not an array of {dtypes[0]}")
+        _refuse(f"{label} is {found}, not an array of {dtype}")
     if array.ndim != 1:
         _refuse(f"{label} has {array.ndim} dimensions, not one")
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from rosbags.interfaces import Nodetype
 from rosbags.typesys.base import normalize_fieldname
 
-from reconros_zenoh.ros.forms import is_number, is_string
+from reconros_zenoh.ros.forms import is_number, is_string, number
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -21,19 +21,17 @@ ENCAPSULATION = b"\0\1\0\0"
 """What precedes each message: positions count from its first byte, alignment from behind it."""
 
 _CODES = {
-    "bool": "?",
-    "byte": "b",
-    "char": "B",
-    "int8": "b",
-    "uint8": "B",
-    "int16": "h",
-    "uint16": "H",
-    "int32": "i",
-    "uint32": "I",
-    "int64": "q",
-    "uint64": "Q",
-    "float32": "f",
-    "float64": "d",
+    "b1": "?",
+    "i1": "b",
+    "u1": "B",
+    "i2": "h",
+    "u2": "H",
+    "i4": "i",
+    "u4": "I",
+    "i8": "q",
+    "u8": "Q",
+    "f4": "f",
+    "f8": "d",
 }
 _LARGEST = 8
 ANYWHERE = frozenset(range(_LARGEST))
@@ -114,7 +112,7 @@ class Generator(ABC):
         if form[0] == Nodetype.BASE:
             if is_string(form):
                 return self._string(field, int(form[1][1] or 0))
-            return self._number(field, _CODES[form[1][0]])
+            return self._number(field, _CODES[number(form).str[1:]])
         element, length = form[1]
         size = length if form[0] == Nodetype.ARRAY else None
         if is_number(element):
