@@ -109,7 +109,7 @@ class _Encoder(Generator):
         is_one = f"type({array}) is {self._constant(np.ndarray)} and {array}.dtype is {self._constant(dtype)}"
         self._write(f"if not ({is_one} and {array}.ndim == 1):")
         arguments = f"{field.label!r}, {array}, {self._constant(dtype)}"
-        self._write(f"    {self._constant(_check_array)}({arguments})")
+        self._write(f"    {array} = {self._constant(_plain_array)}({arguments})")
         self._begin(field, array, size, most)
         self._align(dtype.itemsize, size, f"len({array})")
         piece = f"({array} if {array}.flags.c_contiguous else {array}.tobytes())"
@@ -224,13 +224,15 @@ class _Decoder(Generator):
         return count
 
 
-def _check_array(label: str, array: Any, dtype: np.dtype[Any]) -> None:
+def _plain_array(label: str, array: Any, dtype: np.dtype[Any]) -> np.ndarray[Any, Any]:
+    """Return an array whose methods are those of NumPy: a masked one has others."""
     is_array = isinstance(array, np.ndarray)
     if not is_array or array.dtype != dtype:
         found = f"an array of {array.dtype}" if is_array else f"a {type(array).__name__}"
         _refuse(f"{label} is {found}, not an array of {dtype}")
     if array.ndim != 1:
         _refuse(f"{label} has {array.ndim} dimensions, not one")
+    return np.asarray(array)
 
 
 def _check_bool(label: str, value: object) -> None:

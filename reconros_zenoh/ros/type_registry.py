@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from rosbags.typesys.store import Typestore
 
 _DEEPEST = 19
-"""How deep messages are in messages: with a list of strings there are then 20 nested loops, Python's limit."""
+"""How deep messages are in messages: with a list of strings these are 20 nested loops, Python's limit."""
 
 
 class TypeRegistry:

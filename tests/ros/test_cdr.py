@@ -253,6 +253,14 @@ def test_every_second_element_is_copied(length: int) -> None:
     assert np.array_equal(kind.decode(payload).data, message.data)
 
 
+@pytest.mark.parametrize("step", [1, 2])
+@pytest.mark.parametrize("length", [20, 200_000])
+def test_of_a_masked_array_every_element_is_sent(length: int, step: int) -> None:
+    masked = np.ma.masked_array(np.arange(length).astype(np.uint32), mask=np.arange(length) % 3 == 0)[::step]
+    payload = b"".join(SORT.encode(SORT.cls(masked)))
+    assert np.array_equal(SORT.decode(payload).unsorted, np.arange(0, length, step))
+
+
 def test_encoding_leaves_the_message_as_it_was() -> None:
     array = np.zeros(100_000, np.uint8)
     message = image(array)
