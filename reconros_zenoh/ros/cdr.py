@@ -52,7 +52,7 @@ def decoder(store: Typestore, type_name: str) -> Decode:
     return function
 
 
-class _Encoder(Generator):
+class _Encoder(Generator[None]):
     """`_pieces` are the expressions for the pieces of the payload, `_arrays` those that are arrays."""
 
     def __init__(self, store: Typestore) -> None:
@@ -80,19 +80,17 @@ class _Encoder(Generator):
         self._pieces.append(piece)
         self._write(f"at += len({piece})")
 
-    def _message(self, field: Field, type_name: str) -> str:
+    def _message(self, field: Field, type_name: str) -> None:
         message = self._variable(field.value)
         self._values(type_name, message)
-        return message
 
-    def _number(self, field: Field, code: str) -> str:
+    def _number(self, field: Field, code: str) -> None:
         if code == "?":  # whatever is true would be packed
             self._write(f"if type({field.value}) is not {self._constant(bool)}:")
             self._write(f"    {self._constant(_check_bool)}({field.label!r}, {field.value})")
         self._run.append(Number(code, struct.calcsize(f"<{code}"), field.value))
-        return field.value
 
-    def _string(self, field: Field, most: int) -> str:
+    def _string(self, field: Field, most: int) -> None:
         if most:
             self._check_length(field, field.value, None, most)
         encoded = self._variable(f"{field.value}.encode()")
@@ -101,9 +99,8 @@ class _Encoder(Generator):
         self._add_piece(encoded)
         self._residues = ANYWHERE
         self._run.append(Number("x", 1, None))
-        return encoded
 
-    def _array(self, field: Field, element: FieldDesc, size: int | None, most: int) -> str:
+    def _array(self, field: Field, element: FieldDesc, size: int | None, most: int) -> None:
         dtype = np.dtype(number(element).str)  # the very object that most arrays have
         array = self._variable(field.value)
         is_one = f"type({array}) is {self._constant(np.ndarray)} and {array}.dtype is {self._constant(dtype)}"
@@ -116,9 +113,8 @@ class _Encoder(Generator):
         self._pieces.append(piece)
         self._arrays[piece] = array
         self._write(f"at += {array}.nbytes")
-        return array
 
-    def _list(self, field: Field, element: FieldDesc, size: int | None, most: int) -> str:
+    def _list(self, field: Field, element: FieldDesc, size: int | None, most: int) -> None:
         elements, each = self._variable(field.value), self._variable()
         if is_string(element):
             self._write(f"if isinstance({elements}, str):")
@@ -136,7 +132,6 @@ class _Encoder(Generator):
         self._depth -= 1
         self._pieces, self._residues = outside, ANYWHERE
         self._pieces.append(f"b''.join({joined})")
-        return elements
 
     def _begin(self, field: Field, elements: str, size: int | None, most: int) -> None:
         """Check how many elements there are, and let their number go before those of a sequence."""
@@ -152,7 +147,7 @@ class _Encoder(Generator):
         self._write(f"    {self._constant(_refuse)}({problem})")
 
 
-class _Decoder(Generator):
+class _Decoder(Generator[str]):
     def _write_all(self, type_name: str) -> None:
         self._run.append(Number(f"{len(ENCAPSULATION)}x", 1, None))
         message = self._message(Field("", ""), type_name)

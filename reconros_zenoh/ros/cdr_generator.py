@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import struct
 from abc import ABC, abstractmethod
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
 
 from rosbags.interfaces import Nodetype
 from rosbags.typesys.base import normalize_fieldname
@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
     from rosbags.interfaces.typing import FieldDesc
     from rosbags.typesys.store import Typestore
+
+V = TypeVar("V")
 
 ENCAPSULATION = b"\0\1\0\0"
 """What precedes each message: positions count from its first byte, alignment from behind it."""
@@ -33,8 +35,8 @@ _CODES = {
     "f4": "f",
     "f8": "d",
 }
-_LARGEST = 8
-ANYWHERE = frozenset(range(_LARGEST))
+_MAXALIGN = 8
+ANYWHERE = frozenset(range(_MAXALIGN))
 
 
 def fields_of(store: Typestore, type_name: str) -> list[tuple[str, FieldDesc]]:
@@ -54,14 +56,14 @@ class Number(NamedTuple):
 
 
 class Field(NamedTuple):
-    """How errors name a field, and the expression for its value, if it has one yet."""
+    """How errors name a field, and, where it is encoded, the expression for its value."""
 
     label: str
     value: str
 
 
-class Generator(ABC):
-    """Writes the source of a function: what encoding and decoding have in common.
+class Generator(ABC, Generic[V]):
+    """Writes the source of a function; V is what it then knows of a value: a decoder, the expression for it.
 
     `at` is the position in it. `_run` are numbers that are not packed or unpacked yet, `_residues` what the
     position before them can be modulo 8.
@@ -99,14 +101,14 @@ class Generator(ABC):
         self._globals[name] = value
         return name
 
-    def _values(self, type_name: str, message: str) -> list[str]:
-        """Write the way of all fields of a message, and return the expressions for their values."""
+    def _values(self, type_name: str, message: str) -> list[V]:
+        """Write what encodes or decodes the fields of a message."""
         return [
             self._value(Field(f"field {name!r} of {type_name}", f"{message}.{name}"), form)
             for name, form in fields_of(self._store, type_name)
         ]
 
-    def _value(self, field: Field, form: FieldDesc) -> str:
+    def _value(self, field: Field, form: FieldDesc) -> V:
         if form[0] == Nodetype.NAME:
             return self._message(field, form[1])
         if form[0] == Nodetype.BASE:
@@ -124,7 +126,7 @@ class Generator(ABC):
         if self._run:
             structures = {residue: _structure(self._run, residue) for residue in self._residues}
             self._pack([each.value for each in self._run if each.value], structures)
-            self._residues = frozenset((at + each.size) % _LARGEST for at, each in structures.items())
+            self._residues = frozenset((at + each.size) % _MAXALIGN for at, each in structures.items())
             self._run = []
 
     def _chosen(self, structures: dict[int, struct.Struct], part: Callable[[struct.Struct], object]) -> str:
@@ -132,8 +134,8 @@ class Generator(ABC):
         first, *others = structures.values()
         if all(other.format == first.format for other in others):
             return self._constant(part(first))
-        table = [part(structures[at]) if at in structures else None for at in range(_LARGEST)]
-        return f"{self._constant(table)}[at & {_LARGEST - 1}]"
+        table = [part(structures[at]) if at in structures else None for at in range(_MAXALIGN)]
+        return f"{self._constant(table)}[at & {_MAXALIGN - 1}]"
 
     def _align(self, itemsize: int, size: int | None, count: str) -> None:
         """End the run, and write what aligns the numbers of an array of `count` elements that come next."""
@@ -145,9 +147,9 @@ class Generator(ABC):
             # An empty sequence is not aligned.
             self._pad(f"({len(ENCAPSULATION)} - at) % {itemsize} if {count} else 0")
             self._residues |= {aligned}
-        counts = range(_LARGEST) if size is None else (size,)
+        counts = range(_MAXALIGN) if size is None else (size,)
         self._residues = frozenset(
-            (residue + each * itemsize) % _LARGEST for residue in self._residues for each in counts
+            (residue + each * itemsize) % _MAXALIGN for residue in self._residues for each in counts
         )
 
     @abstractmethod
@@ -160,19 +162,19 @@ class Generator(ABC):
     def _pad(self, count: str) -> None: ...
 
     @abstractmethod
-    def _message(self, field: Field, type_name: str) -> str: ...
+    def _message(self, field: Field, type_name: str) -> V: ...
 
     @abstractmethod
-    def _number(self, field: Field, code: str) -> str: ...
+    def _number(self, field: Field, code: str) -> V: ...
 
     @abstractmethod
-    def _string(self, field: Field, most: int) -> str: ...
+    def _string(self, field: Field, most: int) -> V: ...
 
     @abstractmethod
-    def _array(self, field: Field, element: FieldDesc, size: int | None, most: int) -> str: ...
+    def _array(self, field: Field, element: FieldDesc, size: int | None, most: int) -> V: ...
 
     @abstractmethod
-    def _list(self, field: Field, element: FieldDesc, size: int | None, most: int) -> str: ...
+    def _list(self, field: Field, element: FieldDesc, size: int | None, most: int) -> V: ...
 
 
 def _structure(run: list[Number], residue: int) -> struct.Struct:
