@@ -300,6 +300,12 @@ def test_a_number_that_does_not_fit_is_a_usage_error(value: Any) -> None:
         kind.encode(kind.cls(value))
 
 
+@pytest.mark.parametrize("value", [7, None, b"seven"])
+def test_what_is_no_string_is_a_usage_error(value: Any) -> None:
+    with pytest.raises(UsageError, match="cannot be serialised"):
+        STRING.encode(STRING.cls(value))
+
+
 @pytest.mark.parametrize("value", [True, False, np.bool_(True)])
 def test_a_bool(value: Any) -> None:
     kind = REGISTRY.message("std_msgs/Bool")
