@@ -63,10 +63,10 @@ class Field(NamedTuple):
 
 
 class Generator(ABC, Generic[V]):
-    """Writes the source of a function; V is what it then knows of a value: a decoder, the expression for it.
+    """Writes the source of a function. V is str, the expression for a value that is decoded, or else None.
 
-    `at` is the position in it. `_run` are numbers that are not packed or unpacked yet, `_residues` what the
-    position before them can be modulo 8.
+    `at` is the position in the payload. `_run` are numbers that are not packed or unpacked yet, `_residues`
+    what the position before them can be modulo 8.
     """
 
     def __init__(self, store: Typestore) -> None:
