@@ -113,7 +113,7 @@ class Generator(ABC, Generic[V]):
             return self._message(field, form[1])
         if form[0] == Nodetype.BASE:
             if is_string(form):
-                return self._string(field, int(form[1][1] or 0))
+                return self._string(field, form[1][1])
             return self._number(field, _CODES[number(form).str[1:]])
         element, length = form[1]
         size = length if form[0] == Nodetype.ARRAY else None
@@ -139,7 +139,7 @@ class Generator(ABC, Generic[V]):
 
     def _align(self, itemsize: int, size: int | None, count: str) -> None:
         """End the run, and write what aligns the numbers of an array of `count` elements that come next."""
-        if size is not None:
+        if size is not None:  # in one with the numbers before it, which costs least
             self._run.append(Number("", itemsize, None))
         self._end_run()
         aligned = len(ENCAPSULATION) % itemsize
