@@ -170,6 +170,13 @@ def test_of_a_masked_array_every_element_is_sent(length: int, step: int) -> None
     assert np.array_equal(SORT.decode(payload).unsorted, np.arange(0, length, step))
 
 
+def test_what_may_change_before_the_parts_are_joined_is_copied() -> None:
+    array = np.zeros(100_000, np.uint8)
+    parts = IMAGE.encode(image(array))
+    array[:] = 7
+    assert not any(parts[1])
+
+
 def test_encoding_leaves_the_message_as_it_was() -> None:
     array = np.zeros(100_000, np.uint8)
     message = image(array)
