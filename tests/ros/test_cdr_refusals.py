@@ -139,6 +139,13 @@ def test_a_field_of_another_form_is_a_usage_error_that_names_it(field: str, valu
         kind.encode(message)
 
 
+def test_an_array_of_two_dimensions_is_told() -> None:
+    with pytest.raises(
+        UsageError, match="'unsorted' of sorter_msgs/srv/Sort_Request has 2 dimensions, not one"
+    ):
+        SORT.encode(SORT.cls(np.zeros((2, 2), np.uint32)))
+
+
 def test_a_byte_has_no_sign() -> None:
     kind = REGISTRY.message("std_msgs/Byte")
     assert kind.encode(kind.cls(200)) == (b"\0\1\0\0\xc8",)
