@@ -283,4 +283,6 @@ def test_a_string_that_is_not_utf_8() -> None:
 
 
 def test_a_string_without_its_final_zero() -> None:
-    assert refused(STRING, HELLO[:-1] + b"!").reason == "truncated"
+    error = refused(STRING, HELLO[:-1] + b"!")
+    assert error.reason == "truncated"
+    assert "'data' of std_msgs/msg/String does not end with a zero" in error.detail
