@@ -57,7 +57,7 @@ def decoder(store: Typestore, type_name: str) -> Decode:
     return function
 
 
-class _Encoder(Generator):
+class _Encoder(Generator[None]):
     """`_pieces` are the expressions for the pieces of the payload, `_arrays` those that are arrays."""
 
     def __init__(self, store: Typestore) -> None:
@@ -85,19 +85,17 @@ class _Encoder(Generator):
         self._pieces.append(piece)
         self._write(f"at += len({piece})")
 
-    def _message(self, field: Field, type_name: str) -> str:
+    def _message(self, field: Field, type_name: str) -> None:
         message = self._variable(field.value)
         self._values(type_name, message)
-        return message
 
-    def _number(self, field: Field, code: str) -> str:
+    def _number(self, field: Field, code: str) -> None:
         if code == "?":  # whatever is true would be packed
             self._write(f"if type({field.value}) is not {self._constant(bool)}:")
             self._write(f"    {self._constant(_check_bool)}({field.label!r}, {field.value})")
         self._run.append(Number(code, struct.calcsize(f"<{code}"), field.value))
-        return field.value
 
-    def _string(self, field: Field, most: int) -> str:
+    def _string(self, field: Field, most: int) -> None:
         if most:
             self._check_length(field, field.value, None, most)
         encoded = self._variable(f"{field.value}.encode()")
@@ -106,26 +104,22 @@ class _Encoder(Generator):
         self._add_piece(encoded)
         self._residues = ANYWHERE
         self._run.append(Number("x", 1, None))
-        return encoded
 
-    def _array(self, field: Field, element: FieldDesc, size: int | None, most: int) -> str:
+    def _array(self, field: Field, element: FieldDesc, size: int | None, most: int) -> None:
         dtype = np.dtype(number(element).str)  # the very object that most arrays have
-        # A byte is a signed one as rosbags has it, and an unsigned one in C.
-        dtypes = (dtype, np.dtype("i1")) if element[1][0] == "byte" else (dtype,)
         array = self._variable(field.value)
         is_one = f"type({array}) is {self._constant(np.ndarray)} and {array}.dtype is {self._constant(dtype)}"
         self._write(f"if not ({is_one} and {array}.ndim == 1):")
-        arguments = f"{field.label!r}, {array}, {self._constant(dtypes)}"
-        self._write(f"    {self._constant(_check_array)}({arguments})")
+        arguments = f"{field.label!r}, {array}, {self._constant(dtype)}"
+        self._write(f"    {array} = {self._constant(_plain_array)}({arguments})")
         self._begin(field, array, size, most)
         self._align(dtype.itemsize, size, f"len({array})")
         piece = f"({array} if {array}.flags.c_contiguous else {array}.tobytes())"
         self._pieces.append(piece)
         self._arrays[piece] = array
         self._write(f"at += {array}.nbytes")
-        return array
 
-    def _list(self, field: Field, element: FieldDesc, size: int | None, most: int) -> str:
+    def _list(self, field: Field, element: FieldDesc, size: int | None, most: int) -> None:
         elements, each = self._variable(field.value), self._variable()
         if is_string(element):
             self._write(f"if isinstance({elements}, str):")
@@ -143,7 +137,6 @@ class _Encoder(Generator):
         self._depth -= 1
         self._pieces, self._residues = outside, ANYWHERE
         self._pieces.append(f"b''.join({joined})")
-        return elements
 
     def _begin(self, field: Field, elements: str, size: int | None, most: int) -> None:
         """Check how many elements there are, and let their number go before those of a sequence."""
@@ -159,7 +152,7 @@ class _Encoder(Generator):
         self._write(f"    {self._constant(_refuse)}({problem})")
 
 
-class _Decoder(Generator):
+class _Decoder(Generator[str]):
     def _write_all(self, type_name: str) -> None:
         self._run.append(Number(f"{len(ENCAPSULATION)}x", 1, None))
         message = self._message(Field("", ""), type_name)
@@ -197,7 +190,7 @@ class _Decoder(Generator):
         return value
 
     def _array(self, field: Field, element: FieldDesc, size: int | None, most: int) -> str:
-        dtype = np.dtype("i1") if element[1][0] == "byte" else number(element)
+        dtype = number(element)
         count = self._count(field, size, most)
         self._align(dtype.itemsize, size, count)
         arguments = f"given, {self._constant(dtype)}, {count}, at"
@@ -231,13 +224,15 @@ class _Decoder(Generator):
         return count
 
 
-def _check_array(label: str, array: Any, dtypes: tuple[np.dtype[Any], ...]) -> None:
+def _plain_array(label: str, array: Any, dtype: np.dtype[Any]) -> np.ndarray[Any, Any]:
+    """Return an array whose methods are those of NumPy: a masked one has others."""
     is_array = isinstance(array, np.ndarray)
-    if not is_array or array.dtype not in dtypes:
+    if not is_array or array.dtype != dtype:
         found = f"an array of {array.dtype}" if is_array else f"a {type(array).__name__}"
-        _refuse(f"{label} is {found}, not an array of {dtypes[0]}")
+        _refuse(f"{label} is {found}, not an array of {dtype}")
     if array.ndim != 1:
         _refuse(f"{label} has {array.ndim} dimensions, not one")
+    return np.asarray(array)
 
 
 def _check_bool(label: str, value: object) -> None:

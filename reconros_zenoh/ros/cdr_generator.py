@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import struct
 from abc import ABC, abstractmethod
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
 
 from rosbags.interfaces import Nodetype
 from rosbags.typesys.base import normalize_fieldname
 
-from reconros_zenoh.ros.forms import is_number, is_string
+from reconros_zenoh.ros.forms import is_number, is_string, number
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -17,26 +17,26 @@ if TYPE_CHECKING:
     from rosbags.interfaces.typing import FieldDesc
     from rosbags.typesys.store import Typestore
 
+V = TypeVar("V")
+
 ENCAPSULATION = b"\0\1\0\0"
 """What precedes each message: positions count from its first byte, alignment from behind it."""
 
 _CODES = {
-    "bool": "?",
-    "byte": "b",
-    "char": "B",
-    "int8": "b",
-    "uint8": "B",
-    "int16": "h",
-    "uint16": "H",
-    "int32": "i",
-    "uint32": "I",
-    "int64": "q",
-    "uint64": "Q",
-    "float32": "f",
-    "float64": "d",
+    "b1": "?",
+    "i1": "b",
+    "u1": "B",
+    "i2": "h",
+    "u2": "H",
+    "i4": "i",
+    "u4": "I",
+    "i8": "q",
+    "u8": "Q",
+    "f4": "f",
+    "f8": "d",
 }
-_LARGEST = 8
-ANYWHERE = frozenset(range(_LARGEST))
+_MAXALIGN = 8
+ANYWHERE = frozenset(range(_MAXALIGN))
 
 
 def fields_of(store: Typestore, type_name: str) -> list[tuple[str, FieldDesc]]:
@@ -56,17 +56,17 @@ class Number(NamedTuple):
 
 
 class Field(NamedTuple):
-    """How errors name a field, and the expression for its value, if it has one yet."""
+    """How errors name a field, and, where it is encoded, the expression for its value."""
 
     label: str
     value: str
 
 
-class Generator(ABC):
-    """Writes the source of a function: what encoding and decoding have in common.
+class Generator(ABC, Generic[V]):
+    """Writes the source of a function. V is str, the expression for a value that is decoded, or else None.
 
-    `at` is the position in it. `_run` are numbers that are not packed or unpacked yet, `_residues` what the
-    position before them can be modulo 8.
+    `at` is the position in the payload. `_run` are numbers that are not packed or unpacked yet, `_residues`
+    what the position before them can be modulo 8.
     """
 
     def __init__(self, store: Typestore) -> None:
@@ -101,20 +101,20 @@ class Generator(ABC):
         self._globals[name] = value
         return name
 
-    def _values(self, type_name: str, message: str) -> list[str]:
-        """Write the way of all fields of a message, and return the expressions for their values."""
+    def _values(self, type_name: str, message: str) -> list[V]:
+        """Write what encodes or decodes the fields of a message."""
         return [
             self._value(Field(f"field {name!r} of {type_name}", f"{message}.{name}"), form)
             for name, form in fields_of(self._store, type_name)
         ]
 
-    def _value(self, field: Field, form: FieldDesc) -> str:
+    def _value(self, field: Field, form: FieldDesc) -> V:
         if form[0] == Nodetype.NAME:
             return self._message(field, form[1])
         if form[0] == Nodetype.BASE:
             if is_string(form):
-                return self._string(field, int(form[1][1] or 0))
-            return self._number(field, _CODES[form[1][0]])
+                return self._string(field, form[1][1])
+            return self._number(field, _CODES[number(form).str[1:]])
         element, length = form[1]
         size = length if form[0] == Nodetype.ARRAY else None
         if is_number(element):
@@ -126,7 +126,7 @@ class Generator(ABC):
         if self._run:
             structures = {residue: _structure(self._run, residue) for residue in self._residues}
             self._pack([each.value for each in self._run if each.value], structures)
-            self._residues = frozenset((at + each.size) % _LARGEST for at, each in structures.items())
+            self._residues = frozenset((at + each.size) % _MAXALIGN for at, each in structures.items())
             self._run = []
 
     def _chosen(self, structures: dict[int, struct.Struct], part: Callable[[struct.Struct], object]) -> str:
@@ -134,12 +134,12 @@ class Generator(ABC):
         first, *others = structures.values()
         if all(other.format == first.format for other in others):
             return self._constant(part(first))
-        table = [part(structures[at]) if at in structures else None for at in range(_LARGEST)]
-        return f"{self._constant(table)}[at & {_LARGEST - 1}]"
+        table = [part(structures[at]) if at in structures else None for at in range(_MAXALIGN)]
+        return f"{self._constant(table)}[at & {_MAXALIGN - 1}]"
 
     def _align(self, itemsize: int, size: int | None, count: str) -> None:
         """End the run, and write what aligns the numbers of an array of `count` elements that come next."""
-        if size is not None:
+        if size is not None:  # in one with the numbers before it, which costs least
             self._run.append(Number("", itemsize, None))
         self._end_run()
         aligned = len(ENCAPSULATION) % itemsize
@@ -147,9 +147,9 @@ class Generator(ABC):
             # An empty sequence is not aligned.
             self._pad(f"({len(ENCAPSULATION)} - at) % {itemsize} if {count} else 0")
             self._residues |= {aligned}
-        counts = range(_LARGEST) if size is None else (size,)
+        counts = range(_MAXALIGN) if size is None else (size,)
         self._residues = frozenset(
-            (residue + each * itemsize) % _LARGEST for residue in self._residues for each in counts
+            (residue + each * itemsize) % _MAXALIGN for residue in self._residues for each in counts
         )
 
     @abstractmethod
@@ -162,19 +162,19 @@ class Generator(ABC):
     def _pad(self, count: str) -> None: ...
 
     @abstractmethod
-    def _message(self, field: Field, type_name: str) -> str: ...
+    def _message(self, field: Field, type_name: str) -> V: ...
 
     @abstractmethod
-    def _number(self, field: Field, code: str) -> str: ...
+    def _number(self, field: Field, code: str) -> V: ...
 
     @abstractmethod
-    def _string(self, field: Field, most: int) -> str: ...
+    def _string(self, field: Field, most: int) -> V: ...
 
     @abstractmethod
-    def _array(self, field: Field, element: FieldDesc, size: int | None, most: int) -> str: ...
+    def _array(self, field: Field, element: FieldDesc, size: int | None, most: int) -> V: ...
 
     @abstractmethod
-    def _list(self, field: Field, element: FieldDesc, size: int | None, most: int) -> str: ...
+    def _list(self, field: Field, element: FieldDesc, size: int | None, most: int) -> V: ...
 
 
 def _structure(run: list[Number], residue: int) -> struct.Struct:

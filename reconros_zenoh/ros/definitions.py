@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 _NAME = re.compile(r"(?!.*__)(?!.*_/)([a-z][a-z0-9_]*)/(msg|srv|action)/([A-Z][A-Za-z0-9]*)")
 _WIDE_STRING = re.compile(r"\s*wstring\b")
+_SIZE_BELOW_ONE = re.compile(r"\s*[^\s#]*(\[|<=)(-|\+?0+\b)")
 _ASSIGNMENT = re.compile(r"\s*\S+\s+\w+\s*=")
 _EVENT_INFO = "service_msgs/msg/ServiceEventInfo"
 _GOAL_ID: tuple[str, FieldDesc] = ("goal_id", (Nodetype.NAME, "unique_identifier_msgs/msg/UUID"))
@@ -162,6 +163,8 @@ def _definition(
             continue
         if _WIDE_STRING.match(line):
             raise FileError(name, number, "wstring is not supported.", "Use string, which holds UTF-8.")
+        if _SIZE_BELOW_ONE.match(line):  # rosbags takes a bound of 0 for none
+            raise FileError(name, number, "a size or bound is below 1.", "Write [] for as many as there are.")
         try:
             more_constants, more_fields = _parsed(package, line)
         except (TypesysError, AssertionError, ValueError):  # the last for a number of thousands of digits

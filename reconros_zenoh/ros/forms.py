@@ -10,13 +10,11 @@ from rosbags.interfaces import Nodetype
 if TYPE_CHECKING:
     from rosbags.interfaces.typing import FieldDesc
 
-_NUMBERS = {"char": np.dtype("u1"), "byte": np.dtype("u1"), "octet": np.dtype("u1")}
-
 
 def number(form: FieldDesc) -> np.dtype[np.generic]:
     """Return the dtype of a number in memory, little endian."""
     name = str(form[1][0])
-    return _NUMBERS.get(name) or np.dtype(name).newbyteorder("<")
+    return np.dtype("u1" if name == "byte" else name).newbyteorder("<")
 
 
 def is_number(form: FieldDesc) -> bool:

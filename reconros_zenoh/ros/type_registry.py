@@ -26,6 +26,9 @@ if TYPE_CHECKING:
     from rosbags.interfaces.typing import Typesdict
     from rosbags.typesys.store import Typestore
 
+_DEEPEST = 19
+"""How deep messages are in messages: with a list of strings these are 20 nested loops, Python's limit."""
+
 
 class TypeRegistry:
     """The types of the standard packages of ROS 2 Jazzy, and the types that are added.
@@ -153,6 +156,8 @@ class TypeRegistry:
                 continue
             if inner[1] in (*owners, name):
                 raise UsageError(f"Field {field!r} of {name} contains {name} itself. Take it out.")
+            if len(owners) == _DEEPEST:
+                raise UsageError(f"{owners[0]} has more than {_DEEPEST} levels of messages. Take it apart.")
             self._add_standard(inner[1])
             if inner[1] not in self._store.fielddefs:
                 raise UsageError(

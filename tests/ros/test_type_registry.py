@@ -11,6 +11,7 @@ import pytest
 
 from reconros_zenoh.errors import FileError, UsageError
 from reconros_zenoh.ros.type_registry import TypeRegistry
+from reconros_zenoh.ros.zero_message import zero_message
 
 if TYPE_CHECKING:
     from reconros_zenoh.ros.types import MessageType
@@ -144,6 +145,17 @@ def test_a_message_cannot_contain_itself(registry: TypeRegistry) -> None:
         registry.message("lab_msgs/msg/Tree")
 
 
+def test_a_message_has_nineteen_levels_of_messages_at_most(registry: TypeRegistry) -> None:
+    registry.add_message("lab_msgs/msg/Doll0", "string[] names")
+    for number in range(1, 21):
+        registry.add_message(f"lab_msgs/msg/Doll{number}", f"Doll{number - 1}[1] inside\nuint8 size")
+    kind = registry.message("lab_msgs/Doll19")
+    message = zero_message(kind)
+    assert kind.decode(b"".join(kind.encode(message))) == message
+    with pytest.raises(UsageError, match="lab_msgs/msg/Doll20 has more than 19 levels of messages"):
+        registry.message("lab_msgs/Doll20")
+
+
 def test_adding_a_type_again(registry: TypeRegistry) -> None:
     registry.add_service("sorter_msgs/srv/Sort", SORT)
     registry.add_service("sorter_msgs/srv/Sort", SORT)
@@ -205,6 +217,21 @@ def test_a_line_that_cannot_be_understood_is_named(registry: TypeRegistry, text:
         registry.add_message("lab_msgs/msg/Wrong", text)
     assert caught.value.line == line
     assert caught.value.path == "lab_msgs/msg/Wrong"
+
+
+@pytest.mark.parametrize(
+    "field",
+    ["uint8[0] a", "uint8[-3] a", "uint8[<=0] a", "string<=0 a", "string<=3[00] a", " string<=-1[] a"],
+)
+def test_a_size_below_one_is_refused_as_ros_2_does(registry: TypeRegistry, field: str) -> None:
+    with pytest.raises(FileError, match="a size or bound is below 1") as caught:
+        registry.add_message("lab_msgs/msg/Wrong", f"uint8 b\n{field}")
+    assert caught.value.line == 2
+
+
+def test_a_zero_elsewhere_is_no_size(registry: TypeRegistry) -> None:
+    registry.add_message("lab_msgs/msg/Right", "#[0]\nstring C=a<=0\nuint8[10] a # [0]\nuint8[<=05] b\n")
+    assert registry.message("lab_msgs/Right").cls.C == "a<=0"
 
 
 CONSTANTS: dict[str, object] = {
