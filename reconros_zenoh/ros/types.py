@@ -132,7 +132,7 @@ class MessageType:
         if isinstance(error, FieldError):
             return str(error)
         for name, form in self.fields:
-            alone, value = zero_message(self), getattr(message, name)
+            alone, value = zero_message(self), getattr(message, name, None)
             setattr(alone, name, value)
             try:
                 self._encode(alone)

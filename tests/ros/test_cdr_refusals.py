@@ -61,6 +61,13 @@ def test_the_field_of_a_value_that_does_not_fit_is_named(path: str, value: Any, 
         POSE.encode(message)
 
 
+def test_a_field_that_was_deleted_is_a_usage_error() -> None:
+    message = zero_message(POSE)
+    del message.header.stamp
+    with pytest.raises(UsageError, match="field 'stamp' of std_msgs/msg/Header is None: "):
+        POSE.encode(message)
+
+
 @pytest.mark.parametrize("value", [7, None, b"seven"])
 def test_what_is_no_string_is_a_usage_error(value: Any) -> None:
     with pytest.raises(UsageError, match="cannot be serialised"):
