@@ -30,11 +30,11 @@ ENCODE_ERRORS = (AttributeError, TypeError, ValueError, OverflowError, struct.er
 DECODE_ERRORS = (ValueError, IndexError, struct.error)
 
 
+_ZEROS = [bytes(count) for count in range(8)]
+
+
 class FieldError(TypeError):
     """A field that does not fit, by its name."""
-
-
-_ZEROS = [bytes(count) for count in range(8)]
 
 
 def encoder(store: Typestore, type_name: str) -> Encode:
@@ -106,7 +106,7 @@ class _Encoder(Generator[None]):
         self._run.append(Number("x", 1, None))
 
     def _array(self, field: Field, element: FieldDesc, size: int | None, most: int) -> None:
-        dtype = np.dtype(number(element).str)  # the very object that most arrays have
+        dtype = number(element)
         array = self._variable(field.value)
         is_one = f"type({array}) is {self._constant(np.ndarray)} and {array}.dtype is {self._constant(dtype)}"
         self._write(f"if not ({is_one} and {array}.ndim == 1):")

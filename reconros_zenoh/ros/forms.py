@@ -12,9 +12,9 @@ if TYPE_CHECKING:
 
 
 def number(form: FieldDesc) -> np.dtype[np.generic]:
-    """Return the dtype of a number in memory, little endian."""
+    """Return the dtype of a number in memory, little endian: the very object that most arrays have."""
     name = str(form[1][0])
-    return np.dtype("u1" if name == "byte" else name).newbyteorder("<")
+    return np.dtype(np.dtype("u1" if name == "byte" else name).newbyteorder("<").str)
 
 
 def is_number(form: FieldDesc) -> bool:

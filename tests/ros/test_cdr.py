@@ -188,7 +188,7 @@ def test_decoded_arrays_are_views_of_the_payload() -> None:
     payload = b"".join(IMAGE.encode(image(np.arange(100_000).astype(np.uint8))))
     decoded = IMAGE.decode(payload)
     assert np.shares_memory(decoded.data, np.frombuffer(payload, np.uint8))
-    assert decoded.data.dtype == np.uint8
+    assert decoded.data.dtype is np.dtype(np.uint8)  # this very object is encoded without a closer look
     assert len(decoded.data) == 100_000
 
 
