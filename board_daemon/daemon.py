@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from typing import TYPE_CHECKING, Any
 
 from reconros_zenoh.board.control import ControlServer, claim_name, status
 from reconros_zenoh.board.gateway_control import GatewayServer
-from reconros_zenoh.clock.process import begin_process
+from reconros_zenoh.clock.process import begin_process, real_time_priority
 from reconros_zenoh.clock.virtual import succeed_once
 from reconros_zenoh.measure.trace_file import traced_to
 from reconros_zenoh.project.hosting import HostedBoard
@@ -46,7 +47,9 @@ def run_board(
                 on_ready()
                 if seconds is not None:
                     environment.call_later(round(seconds * 1e9), succeed_once, stop)
-                environment.run(until=stop)
+                # A model has times to keep; without one the board shows what this host does.
+                with real_time_priority() if profile.model else nullcontext():
+                    environment.run(until=stop)
             return status(hosted.board, hosted.executor)
         finally:
             gateways.close()

@@ -146,11 +146,13 @@ class WallEnvironment(VirtualEnvironment):
         """
         lead_ns = self._lead_ns
         while not self._inbox:
-            early_ns = until_ns - time.monotonic_ns()
-            if early_ns <= 0:
+            if time.monotonic_ns() >= until_ns:
                 return
+            # Others who want the interpreter get it here, not in the wait below: that gives it up before it
+            # looks at the clock, so when one of them took the core as well, the sleep began after its work.
+            time.sleep(0)
+            early_ns = until_ns - time.monotonic_ns()
             if early_ns <= lead_ns:
-                time.sleep(0)  # lets other threads have the interpreter
                 return
             self._asleep_until = until_ns
             # A thread whose turn ended before the line above could not see how long we sleep.

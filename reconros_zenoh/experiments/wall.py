@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from reconros_zenoh.experiments.roundtrip import Plan
+    from reconros_zenoh.transport.base import Transport
 
 BOARD = "board0"
 _LOOK_EVERY_S = 0.2
@@ -49,16 +50,19 @@ def run_wall(plan: Plan, report: BoardReport, on_progress: Callable[[str, str], 
                 "OUT": str((plan.folder / mapping).resolve()),
             }
             deployment = read_compose(compose, environment)
-            with (
-                LocalRunner(deployment, plan.folder / mapping / "logs", environment) as runner,
-                _Watch(plan, mapping, router, on_progress),
-            ):
-                try:
-                    runner.run_until(set(CLIENTS))
-                finally:  # an interrupted one, too, has run until now
-                    if runner.states["board"] is ServiceState.HEALTHY:
-                        with suppress(TransportError), ZenohTransport.open(router) as transport:
-                            report.statuses[mapping] = ask_status(transport, BOARD)
+            with LocalRunner(deployment, plan.folder / mapping / "logs", environment) as runner:
+                runner.wait_until_ready()
+                # Not later: each process deals with a new session at once, whatever it should do just then.
+                with (
+                    ZenohTransport.open(router) as transport,
+                    _Watch(plan, mapping, transport, on_progress),
+                ):
+                    try:
+                        runner.run_until(set(CLIENTS))
+                    finally:  # an interrupted one, too, has run until now
+                        if runner.states["board"] is ServiceState.HEALTHY:
+                            with suppress(TransportError):
+                                report.statuses[mapping] = ask_status(transport, BOARD)
 
 
 class _Watch:
@@ -69,12 +73,12 @@ class _Watch:
     """
 
     def __init__(
-        self, plan: Plan, mapping: str, router: str, on_progress: Callable[[str, str], None]
+        self, plan: Plan, mapping: str, transport: Transport, on_progress: Callable[[str, str], None]
     ) -> None:
         self._paths = {client: plan.record_path(mapping, client) for client in CLIENTS}
         self._seen = dict.fromkeys(CLIENTS, 0)
         self._mapping = mapping
-        self._router = router
+        self._transport = transport
         self._on_progress = on_progress
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._run, daemon=True)
@@ -93,8 +97,8 @@ class _Watch:
             if self._ended.wait(_LOOK_EVERY_S):
                 return
             self._look()
-        with suppress(TransportError), ZenohTransport.open(self._router) as transport:
-            ask_status(transport, BOARD, host_anew=True)
+        with suppress(TransportError):
+            ask_status(self._transport, BOARD, host_anew=True)
         while not self._ended.wait(_LOOK_EVERY_S):
             self._look()
 

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import json
+import os
+import sys
 from typing import TYPE_CHECKING
 
-from processes import run
+import pytest
+from processes import Process, run
 
 from reconros_zenoh.board.control import ask_status
+from reconros_zenoh.clock.process import real_time_priority
 from reconros_zenoh.transport.zenoh import ZenohTransport
 
 if TYPE_CHECKING:
@@ -42,3 +46,23 @@ def test_a_board_that_is_not_there_is_named(network: Network) -> None:
         "reconros: no board named 'board7' answers. Start it with `reconros board --name board7`, "
         "or name one that runs: board0.\n"
     )
+
+
+def is_first(pid: int) -> bool:
+    return os.sched_getscheduler(pid) & ~os.SCHED_RESET_ON_FORK == os.SCHED_FIFO
+
+
+def may_be_first() -> bool:
+    with real_time_priority():
+        return is_first(0)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="Linux has these policies")
+@pytest.mark.parametrize(("profile", "has_times_to_keep"), [("miniitx-zynq7100", True), ("native", False)])
+def test_the_loop_of_a_board_has_real_time_priority_where_it_may_and_has_a_model(
+    network: Network, profile: str, has_times_to_keep: bool
+) -> None:
+    with Process("board", "--router", network.endpoint, "--name", "board1", "--profile", profile) as board:
+        board.wait_for("serves")
+        ask_status(network.transport, "board1")  # its loop runs
+        assert is_first(board.pid) == (has_times_to_keep and may_be_first())
