@@ -68,13 +68,14 @@ def real_time_priority() -> Iterator[None]:
     if sys.platform != "linux":
         yield
         return
+    before, parameters = os.sched_getscheduler(0), os.sched_getparam(0)
     with suppress(OSError):
         os.sched_setscheduler(0, os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, os.sched_param(1))
     try:
         yield
-    finally:  # without the flag, only root could
+    finally:  # only root can take the flag away
         with suppress(OSError):
-            os.sched_setscheduler(0, os.SCHED_OTHER | os.SCHED_RESET_ON_FORK, os.sched_param(0))
+            os.sched_setscheduler(0, before | os.SCHED_RESET_ON_FORK, parameters)
 
 
 @cache

@@ -149,7 +149,7 @@ class WallEnvironment(VirtualEnvironment):
             if time.monotonic_ns() >= until_ns:
                 return
             # Others who want the interpreter get it here, not in the wait below: that gives it up before it
-            # looks at the clock, so when one of them took the core as well, the sleep began after its work.
+            # looks at the clock, so if one of them takes the core as well, the sleep begins after its work.
             time.sleep(0)
             early_ns = until_ns - time.monotonic_ns()
             if early_ns <= lead_ns:

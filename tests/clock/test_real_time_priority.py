@@ -15,7 +15,7 @@ from reconros_zenoh.clock.process import real_time_priority
 
 def policy():
     number = os.sched_getscheduler(0) & ~os.SCHED_RESET_ON_FORK
-    return {os.SCHED_OTHER: "normal", os.SCHED_FIFO: "first"}[number]
+    return {os.SCHED_OTHER: "normal", os.SCHED_BATCH: "batch", os.SCHED_FIFO: "first"}[number]
 
 def of_a_new_thread():
     seen = []
@@ -23,6 +23,9 @@ def of_a_new_thread():
     thread.start()
     thread.join()
     return seen[0]
+"""
+BATCH = """
+os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))
 """
 FORBID = """
 resource.setrlimit(resource.RLIMIT_RTPRIO, (0, 0))
@@ -54,8 +57,10 @@ def test_a_thread_has_it_meanwhile_and_those_that_it_starts_have_not() -> None:
     if output(POLICIES, ALLOWED) != ["allowed"]:
         pytest.skip("this user may not have real-time priorities")
     assert output(POLICIES, USE) == ["normal", "first", "normal", "normal", "normal"]
+    assert output(POLICIES, BATCH, USE) == ["batch", "first", "normal", "batch", "batch"]
 
 
 def test_where_it_is_forbidden_all_stays_as_it_was() -> None:
     assert output(POLICIES, FORBID, ALLOWED) == ["forbidden"]
     assert output(POLICIES, FORBID, USE) == ["normal"] * 5
+    assert output(POLICIES, FORBID, BATCH, USE) == ["batch"] * 5
