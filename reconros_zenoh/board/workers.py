@@ -50,11 +50,8 @@ class Worker(ABC):
         self.since_ns = 0
         # Traced or not is known from the start: who is not traced pays nothing for it.
         self._call = self._traced if self._track else self._execute
-        self._activity = Activity(self._run())
-
-    def wake(self) -> None:
+        self.wake = Activity(self._run()).resume
         """Say that a callback which this worker may run has become ready."""
-        self._activity.resume()
 
     def _run(self) -> Generator[Awaitable, object, None]:
         while True:

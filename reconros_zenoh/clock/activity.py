@@ -109,15 +109,13 @@ class Activity:
         """Go on now if parked, else do nothing."""
         if self.parked:
             self.parked = False
-            self._advance(None)
+            self._advance(PARK)
 
-    def _advance(self, event: Awaitable | _Refused | None) -> None:
+    def _advance(self, event: Awaitable | _Refused) -> None:
         """Run the generator until it parks, ends, or waits for something that has not happened."""
         while True:
             try:
-                if event is None:
-                    waited_for = next(self._generator)
-                elif event.ok:
+                if event.ok:
                     waited_for = self._generator.send(event.value)
                 else:
                     cast("simpy.Event", event).defused = True

@@ -6,6 +6,7 @@ from abc import ABC, abstractmethod
 from collections import defaultdict
 from dataclasses import dataclass, field
 from enum import IntEnum
+from itertools import chain
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 if TYPE_CHECKING:
@@ -50,42 +51,39 @@ class CallbackEntry:
 
 
 class Dispatch(NamedTuple):
-    """A callback to run now on `resource`: its message was taken and nobody else runs it."""
+    """A callback to run now: its message was taken and nobody else runs it.
+
+    `implementation` is what the worker starts: a function, or a bitstream.
+    """
 
     entry: CallbackEntry
-    resource: int
+    implementation: object
     message: object
 
-    @property
-    def implementation(self) -> object:
-        """What the worker starts: a function, or a bitstream."""
-        return self.entry.mask.implementations[self.resource]
 
+class CallbackLists(ABC):
+    """The four lists of an executor's main thread: timers, subscribers, service servers, service clients.
 
-class CallbackList:
-    """The callbacks of one kind in the order of registration.
-
-    `ready` says which of them a worker of a resource could start now: a set of bits, bit i for entry i, so
-    that a search costs the same for one callback and for hundreds.
+    Base of both executors, which differ in what they `select`. `_entries` are the callbacks of each kind in
+    the order of registration. `_ready` says for each resource and kind which of them a worker could start
+    now: a set of bits, bit i for entry i, so that a search costs the same for one callback and for hundreds.
     """
 
     def __init__(self) -> None:
-        self._entries: list[CallbackEntry] = []
-        self.ready: defaultdict[int, int] = defaultdict(int)
-
-    def __len__(self) -> int:
-        return len(self._entries)
+        self._entries: list[list[CallbackEntry]] = [[] for _ in CallbackKind]
+        self._ready: defaultdict[int, list[int]] = defaultdict(lambda: [0] * len(CallbackKind))
+        self._names: set[str] = set()
 
     def __iter__(self) -> Iterator[CallbackEntry]:
-        return iter(self._entries)
+        return chain.from_iterable(self._entries)
 
-    def __getitem__(self, index: int) -> CallbackEntry:
-        return self._entries[index]
-
-    def append(self, entry: CallbackEntry) -> None:
-        """Register the entry at the end of the list."""
-        entry.index = len(self._entries)
-        self._entries.append(entry)
+    def add(self, entry: CallbackEntry) -> None:
+        """Register the entry, before any worker asks; raise ValueError when its name is taken."""
+        if entry.name in self._names:
+            raise ValueError(f"a callback named {entry.name!r} is registered already")
+        self._names.add(entry.name)
+        entry.index = len(self._entries[entry.kind])
+        self._entries[entry.kind].append(entry)
         self.refresh(entry)
 
     def refresh(self, entry: CallbackEntry) -> None:
@@ -93,56 +91,27 @@ class CallbackList:
         bit = 1 << entry.index
         if not entry.running and entry.source.is_ready():
             for resource in entry.mask.implementations:
-                self.ready[resource] |= bit
+                self._ready[resource][entry.kind] |= bit
         else:
             for resource in entry.mask.implementations:
-                self.ready[resource] &= ~bit
-
-
-class CallbackLists(ABC):
-    """The four lists of an executor's main thread: timers, subscribers, service servers, service clients.
-
-    Base of both executors, which differ in what they `select`.
-    """
-
-    def __init__(self) -> None:
-        self._lists = {kind: CallbackList() for kind in CallbackKind}
-        self._names: set[str] = set()
-
-    def __getitem__(self, kind: CallbackKind) -> CallbackList:
-        return self._lists[kind]
-
-    def __iter__(self) -> Iterator[CallbackEntry]:
-        for callbacks in self._lists.values():
-            yield from callbacks
-
-    def add(self, entry: CallbackEntry) -> None:
-        """Register the entry, before any worker asks; raise ValueError when its name is taken."""
-        if entry.name in self._names:
-            raise ValueError(f"a callback named {entry.name!r} is registered already")
-        self._names.add(entry.name)
-        self._lists[entry.kind].append(entry)
-
-    def refresh(self, entry: CallbackEntry) -> None:
-        """Note that an event of the entry has come or gone."""
-        self._lists[entry.kind].refresh(entry)
+                self._ready[resource][entry.kind] &= ~bit
 
     @abstractmethod
     def select(self, worker: object, resource: int) -> Dispatch | None:
         """Return the callback that this worker of `resource` must run now, or None when none is ready."""
 
-    def take(self, entry: CallbackEntry, resource: int) -> Dispatch:
-        """Take the entry's oldest event and mark it running until `finish`."""
+    def take(self, kind: CallbackKind, index: int, resource: int) -> Dispatch:
+        """Take the oldest event of an entry and mark it running until `finish`."""
+        entry = self._entries[kind][index]
         message = entry.source.take()
         entry.running = True
-        self._lists[entry.kind].refresh(entry)
-        return Dispatch(entry, resource, message)
+        self.refresh(entry)
+        return Dispatch(entry, entry.mask.implementations[resource], message)
 
     def finish(self, dispatch: Dispatch) -> None:
         """Note that the dispatched callback has run to completion."""
-        entry = dispatch.entry
-        entry.running = False
-        self._lists[entry.kind].refresh(entry)
+        dispatch.entry.running = False
+        self.refresh(dispatch.entry)
 
 
 def lowest(bits: int) -> int:

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 from reconros_zenoh.executor.callbacks import CallbackKind, CallbackLists, lowest
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from reconros_zenoh.executor.callbacks import Dispatch
 
 _WITH_POSITION = (CallbackKind.SUB, CallbackKind.SRV, CallbackKind.CLT)
@@ -21,14 +23,14 @@ class OffsetVector:
     servers behind it.
     """
 
-    def __init__(self, lists: CallbackLists) -> None:
+    def __init__(self, lengths: Sequence[int]) -> None:
+        """`lengths` are those of the lists, by kind."""
         # The paper initialises Position with the length of the list, so that the first search starts over.
-        self._position = {kind: len(lists[kind]) for kind in _WITH_POSITION}
+        self._position = {kind: lengths[kind] for kind in _WITH_POSITION}
 
     def wrap(self) -> None:
         """Do what searches of empty sets do: let every `Position` wrap."""
-        for kind in _WITH_POSITION:
-            self._position[kind] = _BEFORE_THE_FIRST
+        self._position = dict.fromkeys(_WITH_POSITION, _BEFORE_THE_FIRST)
 
     def search(self, kind: CallbackKind, ready: int) -> int | None:
         """Return the first set bit behind `Position` and move there; wrap and return None at the end."""
@@ -52,26 +54,22 @@ class ReconrosExecutor(CallbackLists):
 
     def __init__(self) -> None:
         super().__init__()
-        self._timers = self[CallbackKind.TMR]
-        self._others = [self[kind] for kind in _WITH_POSITION]
         self._offsets: dict[object, OffsetVector] = {}
 
     def select(self, worker: object, resource: int) -> Dispatch | None:
         """Return the callback that this worker of `resource` must run now, or None when none is ready."""
-        timers = self._timers.ready[resource]
-        if timers:
-            return self.take(self._timers[lowest(timers)], resource)
+        ready = self._ready[resource]
+        if timers := ready[CallbackKind.TMR]:
+            return self.take(CallbackKind.TMR, lowest(timers), resource)
         offsets = self._offsets.get(worker)
         if offsets is None:
-            offsets = self._offsets[worker] = OffsetVector(self)
-        ready = [entries.ready[resource] for entries in self._others]
+            offsets = self._offsets[worker] = OffsetVector(list(map(len, self._entries)))
         if not any(ready):
             offsets.wrap()
             return None
         # Twice: the first round may only have wrapped every Position.
-        for _ in range(2):
-            for kind, entries, bits in zip(_WITH_POSITION, self._others, ready, strict=True):
-                index = offsets.search(kind, bits)
-                if index is not None:
-                    return self.take(entries[index], resource)
+        for kind in _WITH_POSITION * 2:
+            index = offsets.search(kind, ready[kind])
+            if index is not None:
+                return self.take(kind, index, resource)
         return None

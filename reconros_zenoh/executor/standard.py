@@ -26,22 +26,21 @@ class StandardExecutor(CallbackLists):
 
     def select(self, worker: object, resource: int) -> Dispatch | None:  # noqa: ARG002 - every worker is alike
         """Return the callback that a worker must run now, or None when none is ready."""
-        timers = self[CallbackKind.TMR].ready[resource]
-        if timers:
-            return self.take(self[CallbackKind.TMR][lowest(timers)], resource)
+        if timers := self._ready[resource][CallbackKind.TMR]:
+            return self.take(CallbackKind.TMR, lowest(timers), resource)
         return self._from_ready_set(resource) or self._collect_and_select(resource)
 
     def _from_ready_set(self, resource: int) -> Dispatch | None:
         for kind in _COLLECTED:
             # What was collected may have gone meanwhile: pushed out by a newer event.
-            serviceable = self._ready_set[kind] & self[kind].ready[resource]
+            serviceable = self._ready_set[kind] & self._ready[resource][kind]
             if serviceable:
                 index = lowest(serviceable)
                 self._ready_set[kind] &= ~(1 << index)
-                return self.take(self[kind][index], resource)
+                return self.take(kind, index, resource)
         return None
 
     def _collect_and_select(self, resource: int) -> Dispatch | None:
         for kind in _COLLECTED:
-            self._ready_set[kind] = self[kind].ready[resource]
+            self._ready_set[kind] = self._ready[resource][kind]
         return self._from_ready_set(resource)

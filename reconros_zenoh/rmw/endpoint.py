@@ -43,7 +43,8 @@ class Endpoint:
             qos,
         ).format()
         self.gid = gid(self._token_key)
-        self._sequence_numbers = itertools.count(1)
+        self.next_sequence_number = itertools.count(1).__next__
+        """Return the number of the endpoint's next message; callable from any thread."""
 
     @property
     def open_key(self) -> str:
@@ -72,10 +73,6 @@ class Endpoint:
         self._token.close()
         for declaration in self._declarations:
             declaration.close()
-
-    def next_sequence_number(self) -> int:
-        """Return the number of the endpoint's next message; callable from any thread."""
-        return next(self._sequence_numbers)
 
     def attachment(self, sequence_number: int) -> bytes:
         """Return the attachment of the message of that number, stamped now."""

@@ -178,7 +178,7 @@ def test_the_reconros_bound_is_reached_when_every_callback_is_always_ready(
         },
     )
     registered = list(executor)
-    for watched in executor[kind]:
+    for watched in [entry for entry in executor if entry.kind is kind]:
         bound = reconros_bound(watched, registered, SOFTWARE)
         served = serve_many(executor, 20 * bound).split()
         turns = [turn for turn, name in enumerate(served) if name == watched.name]

@@ -14,9 +14,7 @@ NOT_TIMERS = (CallbackKind.SUB, CallbackKind.SRV, CallbackKind.CLT)
 
 @pytest.mark.parametrize("kind", NOT_TIMERS)
 def test_position_is_the_callback_served_last_and_wraps_at_the_end_of_the_list(kind: CallbackKind) -> None:
-    executor = ReconrosExecutor()
-    always_ready(executor, **{kind.name: "a b c"})
-    offsets = OffsetVector(executor)
+    offsets = OffsetVector([3] * len(CallbackKind))
     assert offsets.search(kind, 0b111) is None  # Position is initialised with the length of the list
     assert [offsets.search(kind, 0b111) for _ in range(5)] == [0, 1, 2, None, 0]
     assert offsets.search(kind, 0b101) == 2
@@ -26,9 +24,7 @@ def test_position_is_the_callback_served_last_and_wraps_at_the_end_of_the_list(k
 
 
 def test_each_list_has_its_own_position() -> None:
-    executor = ReconrosExecutor()
-    always_ready(executor, SUB="a b", SRV="c d")
-    offsets = OffsetVector(executor)
+    offsets = OffsetVector([2] * len(CallbackKind))
     assert offsets.search(CallbackKind.SUB, 0b11) is None
     assert [offsets.search(CallbackKind.SUB, 0b11) for _ in range(2)] == [0, 1]
     assert offsets.search(CallbackKind.SRV, 0b11) is None
