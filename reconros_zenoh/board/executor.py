@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal, SupportsIndex
 from reconros_zenoh.board.additions import check_addition
 from reconros_zenoh.board.bitstream import Bitstream, read_bitstreams
 from reconros_zenoh.board.callback import HardwareImplementation
-from reconros_zenoh.board.failures import Failures
+from reconros_zenoh.board.failures import Failures, text_of
 from reconros_zenoh.board.hmt import HmtSource
 from reconros_zenoh.board.host import Limit
 from reconros_zenoh.board.software import SoftwareImplementation, is_plain
@@ -243,7 +243,7 @@ class Executor:
                 spans or "0 ms",
                 exc_info=error,
             )
-        self._registrations[name].source.fail(event, f"callback {name} failed: {error}")
+        self._registrations[name].source.fail(event, f"callback {name} failed: {text_of(error)}")
         self._finish(dispatch)
 
     def statistics(self) -> dict[str, dict[str, object]]:
@@ -333,7 +333,8 @@ def _check_message(callback: str, check: Callable[[Any], None], message: object)
         raise
     except (Exception, SystemExit) as error:
         raise BadMessageError(
-            "check_failed", f"the check of callback {callback} failed: {error!r}"
+            "check_failed",
+            f"the check of callback {callback} failed: {type(error).__name__}: {text_of(error)}",
         ) from error
 
 
