@@ -137,17 +137,17 @@ class AddressSpace:
 
     def _free_address(self, size: int) -> int:
         """Return the lowest free address from where the last block ended, going round."""
-        address = self._next if self._next + _room(size) <= _END else _FIRST
-        while True:
-            place = bisect_right(self._starts, address + _room(size) - 1) - 1
-            if place < 0:
-                return address
-            behind = self._starts[place] + _room(len(self._blocks[self._starts[place]].content))
-            if behind <= address:
-                return address
-            address = behind
-            if address + _room(size) > _END:
-                raise MemoryError("the address space of the board is full")
+        for start in (self._next, _FIRST):
+            address = start
+            while address + _room(size) <= _END:
+                place = bisect_right(self._starts, address + _room(size) - 1) - 1
+                if place < 0:
+                    return address
+                behind = self._starts[place] + _room(len(self._blocks[self._starts[place]].content))
+                if behind <= address:
+                    return address
+                address = behind
+        raise MemoryError("the address space of the board is full")
 
 
 class PlacedMessage:
