@@ -150,20 +150,21 @@ class Executor:
         slots = list(slots) if isinstance(slots, Iterable) else []
         if not slots:
             raise UsageError(f"callback {name!r} has no slots to run in. Give their ids: [0].")
-        served = {slot.slot_id for slot in self._slots}
+        served = {slot.slot_id: slot for slot in self._slots}
         for slot in slots:
             if slot not in served:
                 raise UsageError(
                     f"callback {name!r} needs slot {slot!r}, which no hardware worker serves. They serve "
                     f"{', '.join(map(str, sorted(served))) or 'none'}."
                 )
-            time = hardware_time(self.board.profile, name, timing, self.board.slots[slot].clock_hz)
-            self.board.slots[slot].admit(name)
-            self._register(name, kind, source, check).slots[slot] = (
-                thread,
-                time,
-                _limit(name, limit_ms),
-            )
+            served[slot].check(name)
+        profile, limit = self.board.profile, _limit(name, limit_ms)
+        times = {slot: hardware_time(profile, name, timing, served[slot].clock_hz) for slot in slots}
+        # The last that may refuse: what is refused leaves nothing behind.
+        registration = self._register(name, kind, source, check)
+        for slot, time in times.items():
+            served[slot].admit(name)
+            registration.slots[slot] = (thread, time, limit)
 
     def spin(self) -> None:
         """Load the bitstreams, open every source and start the workers.
