@@ -110,6 +110,21 @@ def test_a_messages_own_bytes_are_never_changed() -> None:
     assert placed.load().data.tolist() == [9, 2, 3]
 
 
+def test_memory_that_a_message_was_read_from_stays_the_memory_that_it_was() -> None:
+    """A pointer of a message may lead into memory that hardware and software share."""
+    message_type = types().message("std_msgs/msg/UInt8MultiArray")
+    layout = types().message("std_msgs/msg/MultiArrayLayout").cls(dim=[], data_offset=0)
+    space, shared = AddressSpace(), octets(1, 2, 3)
+    address = space.map(shared)
+    placed = space.place(message_type, message_type.cls(layout=layout, data=octets(0)))
+    sequence = np.array([address, 3, 3], np.uint32).view(np.uint8)
+    space.write(placed.address + space.layout.offsetof(message_type, "data"), sequence)
+    loaded = placed.load()
+    space.write(address, octets(9))
+    assert loaded.data.tolist() == [1, 2, 3]
+    assert shared.tolist() == [9, 2, 3]
+
+
 TEXT = """
 bool yes
 int16 small
