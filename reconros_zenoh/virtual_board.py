@@ -92,8 +92,9 @@ class VirtualDesktop:
         """Return the time [ms] from each message to its answer; the next leaves when the answer is in.
 
         `requests` and `answers` are topic and type name; a message is given by its fields. An answer that
-        does not come within `limit_s` is NaN. Raises UsageError when nobody on the board hears the requests,
-        or nobody publishes answers.
+        does not come within `limit_s` is NaN. One that comes later is taken for that of the message that is
+        under way then, for nothing tells them apart: the limit is to be longer than any answer takes. Raises
+        UsageError when nobody on the board hears the requests, or nobody publishes answers.
         """
         limit_ns = duration_ns("limit_s", limit_s, _SECOND_NS)
         self._check_ends(EndpointKind.SUBSCRIPTION, *requests)
