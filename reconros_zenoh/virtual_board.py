@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import closing
 from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, SupportsIndex
@@ -91,28 +92,28 @@ class VirtualDesktop:
         """Return the time [ms] from each message to its answer; the next leaves when the answer is in.
 
         `requests` and `answers` are topic and type name; a message is given by its fields. An answer that
-        does not come within `limit_s` is NaN. Raises UsageError when nobody on the board hears the requests,
-        or nobody publishes answers.
+        does not come within `limit_s` is NaN. One that comes later is taken for that of the message that is
+        under way then, for nothing tells them apart: the limit is to be longer than any answer takes. Raises
+        UsageError when nobody on the board hears the requests, or nobody publishes answers.
         """
         limit_ns = duration_ns("limit_s", limit_s, _SECOND_NS)
         self._check_ends(EndpointKind.SUBSCRIPTION, *requests)
         self._check_ends(EndpointKind.PUBLISHER, *answers)
         request_type = self.types.message(requests[1])
-        publisher = self.desktop.publisher(request_type, requests[0])
+        answer_type = self.types.message(answers[1])
         arrived = self.environment.event()
-        subscription = self.desktop.subscription(
-            self.types.message(answers[1]), answers[0], lambda _: succeed_once(arrived)
-        )
         times_ms = []
-        for fields in messages:
-            arrived = self.environment.event()
-            sent_ns = self.environment.now
-            limit = self.environment.timeout(limit_ns)
-            publisher.publish(request_type.message(**fields))
-            self.environment.run(until=arrived | limit)
-            times_ms.append((self.environment.now - sent_ns) / 1e6 if arrived.triggered else np.nan)
-        subscription.close()
-        publisher.close()
+        with (
+            closing(self.desktop.publisher(request_type, requests[0])) as publisher,
+            closing(self.desktop.subscription(answer_type, answers[0], lambda _: succeed_once(arrived))),
+        ):
+            for fields in messages:
+                arrived = self.environment.event()
+                sent_ns = self.environment.now
+                limit = self.environment.timeout(limit_ns)
+                publisher.publish(request_type.message(**fields))
+                self.environment.run(until=arrived | limit)
+                times_ms.append((self.environment.now - sent_ns) / 1e6 if arrived.triggered else np.nan)
         return np.array(times_ms)
 
     def status(self) -> dict[str, Any]:

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import reconros_zenoh as rz
+from reconros_zenoh.ros.graph import tokens_expression
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -225,6 +226,16 @@ def test_fields_of_a_message_that_are_not_those_of_its_type() -> None:
     for make in (*makers, board.action("/go", go).result, board.action("/go", go).feedback):
         with pytest.raises(rz.UsageError, match="'dta' is none of them"):
             make(dta=1)
+
+
+def test_round_trips_that_fail_leave_nothing_in_the_network() -> None:
+    board = rz.VirtualBoard()
+    doubling(board)
+    transport = board.desktop.context.transport
+    before = transport.tokens(tokens_expression(0), 0)
+    with pytest.raises(rz.UsageError, match="none of them"):
+        board.round_trips(("/in", WORD), ("/out", WORD), [{"dta": 1}])
+    assert transport.tokens(tokens_expression(0), 0) == before
 
 
 def test_a_board_whose_callbacks_nobody_has_started_does_not_run() -> None:

@@ -11,6 +11,7 @@ from rosbags.interfaces import Nodetype
 
 from reconros_zenoh.ros.c_layout import CLayout
 from reconros_zenoh.ros.forms import is_number, number
+from reconros_zenoh.ros.message_arrays import snapshot
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -91,7 +92,7 @@ class AddressSpace:
     def load(self, message_type: MessageType, address: int) -> Any:
         """Return the message whose struct stands at this address; UnmappedError where a pointer is wrong.
 
-        Its arrays are views of the blocks, which are copied before they change.
+        Its arrays are what they are now, whatever is written to the blocks later.
         """
         struct = self.layout.struct(message_type)
         return message_type.cls(
@@ -122,9 +123,7 @@ class AddressSpace:
         dtype = number(form)
         if not length:
             return np.empty(0, dtype)
-        block, offset = self._find(address, length * size)
-        block.owned = False
-        return np.frombuffer(block.content, dtype, length, offset)
+        return snapshot(self.read(address, length * size).view(dtype))
 
     def _find(self, address: int, size: int) -> tuple[_Block, int]:
         place = bisect_right(self._starts, address) - 1
@@ -137,17 +136,17 @@ class AddressSpace:
 
     def _free_address(self, size: int) -> int:
         """Return the lowest free address from where the last block ended, going round."""
-        address = self._next if self._next + _room(size) <= _END else _FIRST
-        while True:
-            place = bisect_right(self._starts, address + _room(size) - 1) - 1
-            if place < 0:
-                return address
-            behind = self._starts[place] + _room(len(self._blocks[self._starts[place]].content))
-            if behind <= address:
-                return address
-            address = behind
-            if address + _room(size) > _END:
-                raise MemoryError("the address space of the board is full")
+        for start in (self._next, _FIRST):
+            address = start
+            while address + _room(size) <= _END:
+                place = bisect_right(self._starts, address + _room(size) - 1) - 1
+                if place < 0:
+                    return address
+                behind = self._starts[place] + _room(len(self._blocks[self._starts[place]].content))
+                if behind <= address:
+                    return address
+                address = behind
+        raise MemoryError("the address space of the board is full")
 
 
 class PlacedMessage:

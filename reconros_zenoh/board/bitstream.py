@@ -15,10 +15,10 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 # magic, slot, length of the callback's name, size of the whole file; then the CRC-32 of all but itself
-_HEADER = struct.Struct("<8sHHQ")
+_HEADER = struct.Struct("<8sQIQ")
 _CRC = struct.Struct("<I")
 _NAME_AT = _HEADER.size + _CRC.size
-_MAGIC = b"RRZBIT01"
+_MAGIC = b"RRZBIT02"
 _LIMIT_BYTES = 1_000_000_000
 _REBUILD = "Write it again with `reconros build`."
 _REBUILD_ALIKE = "Write it again with `reconros build`, with the same --profile."

@@ -164,8 +164,8 @@ class Board:
         """Return a new gateway between the topics of these absolute names; `qos` is for its ends on the SMT.
 
         It has the slot for itself, which holds it since power-up, or else as soon as its bitstream is
-        written. Raise UsageError when one of the topics has a gateway already or another type, and for a slot
-        that is not free.
+        written. Raise UsageError when one of the topics has a gateway already or another type, for the name
+        of another gateway, and for a slot that is not free.
         """
         if self.profile.model is not None and self.profile.model.gateway is None:
             raise UsageError(
@@ -181,6 +181,8 @@ class Board:
             raise UsageError(
                 f"{taken} has a gateway on board {self.name!r} already: two would send messages round."
             )
+        if any(gateway.name == name for gateway in self.gateways):
+            raise UsageError(f"board {self.name!r} has a gateway {name!r} already. Give another name.")
         topic = self.hardware_topic(hmt, message_type)
         bitstream = slot.admit(name, alone=True)
         if at_power_up:

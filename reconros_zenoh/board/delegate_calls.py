@@ -110,8 +110,10 @@ class DelegateCalls(NotedCalls):
 
     def _blocked(self, what: str, wait: Generator[Awaitable, object, R]) -> Generator[Awaitable, object, R]:
         self._timeline.waits_for = what
-        result = yield from wait
-        self._timeline.waits_for = ""
+        try:
+            result = yield from wait
+        finally:  # the callback may go on after an error
+            self._timeline.waits_for = ""
         self._timeline.mark("blocked")
         return result
 

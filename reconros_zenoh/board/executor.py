@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal, SupportsIndex
 from reconros_zenoh.board.additions import check_addition
 from reconros_zenoh.board.bitstream import Bitstream, read_bitstreams
 from reconros_zenoh.board.callback import HardwareImplementation
-from reconros_zenoh.board.failures import Failures
+from reconros_zenoh.board.failures import Failures, text_of
 from reconros_zenoh.board.hmt import HmtSource
 from reconros_zenoh.board.host import Limit
 from reconros_zenoh.board.software import SoftwareImplementation, is_plain
@@ -150,20 +150,21 @@ class Executor:
         slots = list(slots) if isinstance(slots, Iterable) else []
         if not slots:
             raise UsageError(f"callback {name!r} has no slots to run in. Give their ids: [0].")
-        served = {slot.slot_id for slot in self._slots}
+        served = {slot.slot_id: slot for slot in self._slots}
         for slot in slots:
             if slot not in served:
                 raise UsageError(
                     f"callback {name!r} needs slot {slot!r}, which no hardware worker serves. They serve "
                     f"{', '.join(map(str, sorted(served))) or 'none'}."
                 )
-            time = hardware_time(self.board.profile, name, timing, self.board.slots[slot].clock_hz)
-            self.board.slots[slot].admit(name)
-            self._register(name, kind, source, check).slots[slot] = (
-                thread,
-                time,
-                _limit(name, limit_ms),
-            )
+            served[slot].check(name)
+        profile, limit = self.board.profile, _limit(name, limit_ms)
+        times = {slot: hardware_time(profile, name, timing, served[slot].clock_hz) for slot in slots}
+        # The last that may refuse: what is refused leaves nothing behind.
+        registration = self._register(name, kind, source, check)
+        for slot, time in times.items():
+            served[slot].admit(name)
+            registration.slots[slot] = (thread, time, limit)
 
     def spin(self) -> None:
         """Load the bitstreams, open every source and start the workers.
@@ -243,7 +244,7 @@ class Executor:
                 spans or "0 ms",
                 exc_info=error,
             )
-        self._registrations[name].source.fail(event, f"callback {name} failed: {error}")
+        self._registrations[name].source.fail(event, f"callback {name} failed: {text_of(error)}")
         self._finish(dispatch)
 
     def statistics(self) -> dict[str, dict[str, object]]:
@@ -333,7 +334,8 @@ def _check_message(callback: str, check: Callable[[Any], None], message: object)
         raise
     except (Exception, SystemExit) as error:
         raise BadMessageError(
-            "check_failed", f"the check of callback {callback} failed: {error!r}"
+            "check_failed",
+            f"the check of callback {callback} failed: {type(error).__name__}: {text_of(error)}",
         ) from error
 
 

@@ -1,4 +1,4 @@
-"""Failures that are told once."""
+"""What is told of failures, and that each is told once."""
 
 from __future__ import annotations
 
@@ -20,3 +20,11 @@ class Failures:
         is_new = way not in self._known
         self._known.add(way)
         return is_new
+
+
+def text_of(error: BaseException) -> str:
+    """Return what the error says; one of a callback may fail at that, too."""
+    try:
+        return str(error)
+    except Exception:  # noqa: BLE001 - whatever its `__str__` raises
+        return "it cannot say why"

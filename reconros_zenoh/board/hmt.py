@@ -202,10 +202,12 @@ class HardwareTopic:
                 )
         fifos = [fifo for fifo in self._fifos if fifo.own is None or fifo.own.passes(publisher)]
         self.waits += any(fifo.blocks for fifo in fifos)
-        while full := next((fifo for fifo in fifos if fifo.blocks), None):
-            timeline.waits_for = self._room
-            yield full.room
-        timeline.waits_for = ""
+        try:
+            while full := next((fifo for fifo in fifos if fifo.blocks), None):
+                timeline.waits_for = self._room
+                yield full.room
+        finally:  # the callback may go on after an error
+            timeline.waits_for = ""
         # All places at once: who held one while waiting for another could keep a third from going on.
         targets = [fifo for fifo in fifos if fifo.reserve()]
         streamed = Streamed(publisher, message, size, targets, timeline, Signal(), sender, read)

@@ -26,7 +26,7 @@ R = TypeVar("R")
 R_co = TypeVar("R_co", covariant=True)
 _RESULTS_KEPT = 512
 _CONSTANTS_KEPT = 8
-_VALUES = (int, float, complex, str, bytes, np.generic, type(None))
+_VALUES = (int, str, bytes, np.generic, type(None))
 _RUNS_REMEMBERED = 32
 _IN_LINE_NS = 100_000
 """About what it costs to hand a computation to another thread and its result back."""
@@ -287,14 +287,17 @@ def _is_constant(argument: object) -> bool:
 def _identity(argument: object) -> object:
     """Return something equal for equal arguments: arrays by shape, type and a hash of their content.
 
-    Numbers of different types are different, as a kernel may overflow with one of them. Raise TypeError for
+    Numbers of different types are different, as a kernel may overflow with one of them, and so are those of
+    different sign, as `atan2` tells both zeros apart. Raise TypeError for
     what may change while it stays equal to itself.
     """
     if isinstance(argument, np.ndarray):
         if _is_constant(argument):
             return _Unchanging(argument)
         content = np.ascontiguousarray(argument)
-        return argument.shape, argument.dtype.str, xxhash.xxh3_128_digest(content.data)
+        return argument.shape, argument.dtype, xxhash.xxh3_128_digest(content.data)
+    if isinstance(argument, float | complex | np.inexact):  # by its bytes: -0.0 is equal to 0.0
+        return type(argument), np.array(argument).tobytes()
     if not isinstance(argument, _VALUES):
         raise TypeError(f"{type(argument).__name__} may change")
     return type(argument), argument

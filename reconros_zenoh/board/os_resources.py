@@ -14,6 +14,7 @@ from __future__ import annotations
 import threading
 from collections import deque
 from dataclasses import dataclass
+from operator import index
 from typing import TYPE_CHECKING
 
 from reconros_zenoh.clock.activity import Signal
@@ -73,7 +74,8 @@ class Mailbox:
         with self._lock:
             if len(self._words) >= self._size:
                 return False
-            self._words.append(word & 0xFFFF_FFFF)
+            # One of an array may have a type that the mask does not fit.
+            self._words.append(index(word) & 0xFFFF_FFFF)
         self._getters.tell()
         return True
 

@@ -45,10 +45,10 @@ class Slot:
         self.reconfiguring = BusyTime(environment, trace.icap if trace else None)
         self.waiting = BusyTime(environment)
 
-    def admit(self, name: str, *, alone: bool = False) -> Bitstream:
-        """Let this hardware thread or gateway be in the slot, and return the bitstream that brings it there.
+    def check(self, name: str, *, alone: bool = False) -> None:
+        """Raise UsageError unless this hardware thread or gateway can be in the slot.
 
-        Raise UsageError when it, or who is there, must be `alone`, or the slot has its one tenant.
+        It cannot when it, or who is there, must be `alone`, or the slot has its one tenant.
         """
         if alone or self.is_given_away:
             in_the_way = self.tenants
@@ -60,6 +60,13 @@ class Slot:
                 f"{name!r} cannot be in slot {self.slot_id}, which is for {', '.join(sorted(in_the_way))}"
                 f"{kind}. Give one of them another slot."
             )
+
+    def admit(self, name: str, *, alone: bool = False) -> Bitstream:
+        """Let this hardware thread or gateway be in the slot, and return the bitstream that brings it there.
+
+        Raise UsageError as `check`.
+        """
+        self.check(name, alone=alone)
         self.tenants.add(name)
         self.is_given_away = alone
         bitstream = Bitstream(self.slot_id, name, self.bitstream_size)

@@ -103,8 +103,9 @@ class CallbackLists(ABC):
     def take(self, kind: CallbackKind, index: int, resource: int) -> Dispatch:
         """Take the oldest event of an entry and mark it running until `finish`."""
         entry = self._entries[kind][index]
-        message = entry.source.take()
+        # Before its event is taken: that makes room, and where nothing takes time the next one comes at once.
         entry.running = True
+        message = entry.source.take()
         self.refresh(entry)
         return Dispatch(entry, entry.mask.implementations[resource], message)
 

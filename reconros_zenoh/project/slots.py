@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from itertools import product
 from typing import TYPE_CHECKING
 
 from reconros_zenoh.project.clocks import read_clock_name
@@ -41,7 +42,7 @@ def read_slots(
     """Return the slots of all `[HwSlot@name(a:b)]` sections.
 
     The first slot of a range has the number `Id`, the others count on from it. With partial reconfiguration
-    each reconfigurable slot needs a region.
+    each reconfigurable slot needs a region; one that overlaps with that of another slot is warned of.
     """
     slots: list[HwSlot] = []
     for section in sections:
@@ -52,8 +53,21 @@ def read_slots(
                     f"{slot.name} (Id {slot.id}) and {twin.name} (Id {twin.id}) of line {twin.line} overlap.",
                     "Give each slot a name and an Id of its own; Id is that of the first slot of a range.",
                 )
+            warnings += _overlap(section, slot, slots)
             slots.append(slot)
     return slots
+
+
+def _overlap(section: Section, slot: HwSlot, others: Iterable[HwSlot]) -> Iterator[str]:
+    """Yield a warning, no error because synthesis decides, if another slot has sites of this one."""
+    for other in others:
+        for own, theirs in product(slot.regions, other.regions):
+            if own.overlaps(theirs):
+                yield (
+                    f"{section.path}:{slot.line}: {own} of {slot.name} overlaps {theirs} of {other.name} in "
+                    f"line {other.line}. Give each site to one slot."
+                )
+                return
 
 
 def _slots_of(

@@ -202,6 +202,23 @@ def test_a_callback_in_two_places_has_one_kind_and_one_check() -> None:
             executor.add_hw_callback("a", [0], kind, source, logging_thread([], "a"), check)
 
 
+@pytest.mark.parametrize(
+    ("slots", "source", "limit_ms"),
+    [([0, 5], "own", None), ([0, 1], "own", None), ([0], "own", -1), ([0], "of b", None)],
+    ids=["no slot", "slot of another", "limit", "source of another"],
+)
+def test_of_a_refused_callback_nothing_stays(slots: list[int], source: str, limit_ms: float | None) -> None:
+    board = small_board(small_profile(dict.fromkeys("ab", (10, 10))), 3, static=[1])
+    executor, sources = Executor(board, 0, 3), {"own": Tickets(board), "of b": Tickets(board)}
+    executor.add_hw_callback("b", [1], SUB, sources["of b"], logging_thread([], "b"))
+    with pytest.raises(UsageError):
+        executor.add_hw_callback("a", slots, SUB, sources[source], logging_thread([], "a"), limit_ms=limit_ms)
+    assert list(executor.statistics()) == ["b"]
+    executor.add_hw_callback("a", [2], SUB, sources["own"], logging_thread([], "a"))
+    assert executor.statistics()["a"]["slots"] == [2]
+    assert [board.slots[slot].tenants for slot in range(3)] == [set(), {"b"}, {"a"}]
+
+
 def test_a_source_makes_one_callback_ready() -> None:
     board = small_board(small_profile(dict.fromkeys("ab", (10, 10))))
     executor, other = Executor(board, 1, 0), Executor(board, 1, 0)

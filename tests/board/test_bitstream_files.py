@@ -45,7 +45,7 @@ def test_the_name_is_that_of_reconros() -> None:
     assert SOBEL.file_name == "pblock_slot_3_sobel_3_partial.bit"
 
 
-@given(st.integers(0, 40), names, st.integers(100, 5000))
+@given(st.integers(0, 40) | st.just(10**18), names, st.integers(100, 5000))
 def test_what_is_written_comes_back(folder: Path, slot: int, callback: str, size: int) -> None:
     bitstream = Bitstream(slot, callback, size)
     path = bitstream.write(folder)
@@ -68,6 +68,11 @@ def test_a_folder_that_cannot_be_made_is_named(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     with pytest.raises(UsageError, match=r"file.pblock_slot_3_.* cannot be written .* another folder"):
         SOBEL.write(tmp_path / "file")
+
+
+def test_a_name_that_is_too_long_for_a_file(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match=r"cannot be written .File name too long"):
+        Bitstream(0, 70_000 * "a", 100_000).write(tmp_path)
 
 
 def test_a_bitstream_too_small_for_its_header() -> None:
@@ -141,8 +146,8 @@ def test_a_foreign_file(folder: Path, content: bytes) -> None:
 
 def test_a_name_that_is_no_text(tmp_path: Path) -> None:
     path = tmp_path / SOBEL.file_name
-    header = struct.pack("<8sHHQ", b"RRZBIT01", 3, 5, 200)
-    body = b"\xff" * 5 + bytes(171)
+    header = struct.pack("<8sQIQ", b"RRZBIT02", 3, 5, 200)
+    body = b"\xff" * 5 + bytes(163)
     path.write_bytes(header + struct.pack("<I", zlib.crc32(body, zlib.crc32(header))) + body)
     assert "holds callback" in refusal(lambda: read_bitstreams(tmp_path, [SOBEL]), path)
 

@@ -34,6 +34,19 @@ class NoughtError(Exception):
     """What the callbacks here raise."""
 
 
+class SpeechlessError(Exception):
+    """Fails when it is asked what it says."""
+
+    def __str__(self) -> str:
+        raise NoughtError
+
+    __repr__ = __str__
+
+
+def speechless() -> None:
+    raise SpeechlessError
+
+
 def one_failure(caplog: pytest.LogCaptureFixture, callback: str, error: type[Exception]) -> str:
     """The text of the one record, which has the traceback."""
     (record,) = caplog.records
@@ -263,6 +276,14 @@ def test_the_client_of_a_service_is_told(in_hardware: bool, caplog: pytest.LogCa
     assert service.executor.failures == {"a": 1}
 
 
+def test_an_error_that_cannot_say_what_it_is_harms_nobody(caplog: pytest.LogCaptureFixture) -> None:
+    service = ServiceBoard(in_hardware=True)
+    answer = service.call(returns=SpeechlessError())
+    assert str(answer) == "service /ask refused: callback a failed: it cannot say why"
+    assert service.call(returns=service.yes()) == service.yes()
+    assert service.executor.failures == {"a": 1}
+
+
 @pytest.mark.parametrize("in_hardware", [True, False], ids=["hardware", "software"])
 @pytest.mark.parametrize("returns", [None, "yes", 7])
 def test_a_service_callback_that_returns_no_response_has_failed(
@@ -339,7 +360,9 @@ def a_message(value: int) -> Any:
 
 
 @pytest.mark.parametrize("way", ["network", "board", "stream", "stream with overhead"])
-@pytest.mark.parametrize("wrong", [lambda: sys.exit(3), lambda: {}["no"]], ids=["exit", "error"])
+@pytest.mark.parametrize(
+    "wrong", [lambda: sys.exit(3), lambda: {}["no"], speechless], ids=["exit", "error", "speechless"]
+)
 def test_a_check_that_fails_itself_refuses_the_message_and_harms_nobody(
     way: str, wrong: Callable[[], Any], caplog: pytest.LogCaptureFixture
 ) -> None:

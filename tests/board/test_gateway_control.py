@@ -70,7 +70,7 @@ def test_a_stream_that_no_callback_has_is_warned_of() -> None:
     running = Running()
     nobody = "no callback of board 'board0' has a hardware-mapped end of {}. Its streams: /c."
     for topic in "ab":
-        answer = running.ask(request(**{**ADD, "hmt": f"/{topic}", "smt": f"/{topic}"}))
+        answer = running.ask(request(**{**ADD, "name": topic, "hmt": f"/{topic}", "smt": f"/{topic}"}))
         assert (answer["refused"], answer["warning"]) == (None, nobody.format(f"/{topic}"))
     answer = running.ask(request(**{**ADD, "hmt": "/typo", "smt": "/typo"}))
     assert answer["refused"].startswith("board 'board0' has no slot for a gateway: ")
@@ -92,7 +92,8 @@ def test_a_gateway_is_added_with_its_qos() -> None:
             request(**{**ADD, "hmt": "/b", "smt": "/b", "type": "std_msgs/msg/Nothing"}),
             "std_msgs/msg/Nothing",
         ),
-        (request(**{**ADD, "hmt": "/c", "smt": "/c", "type": "std_msgs/msg/String"}), "has the type"),
+        (request(**{**ADD, "hmt": "/c", "smt": "/c"}), "has a gateway 'bridge' already. Give another name."),
+        (request(name="c", hmt="/c", smt="/c", type="std_msgs/msg/String"), "has the type"),
         (msgpack.packb({"version": VERSION + 1}), f"speaks version {VERSION}"),
         (request(**{**ADD, "hmt": "/b"}), "/a has a gateway on board 'board0' already"),
         (request(**{**ADD, "hmt": "/b*", "smt": "/b"}), "'/b*' contains '*'"),
@@ -125,9 +126,10 @@ def test_what_cannot_be_added_is_refused_and_changes_nothing(question: bytes, wo
 def test_each_takes_a_slot_and_without_one_it_is_refused() -> None:
     running = Running()
     for number, topic in enumerate("ab"):
-        assert not running.ask(request(**{**ADD, "hmt": f"/{topic}", "smt": f"/{topic}"}))["refused"]
+        wanted = {**ADD, "name": topic, "hmt": f"/{topic}", "smt": f"/{topic}"}
+        assert not running.ask(request(**wanted))["refused"]
         assert gateways(running.board)[-1]["slot"] == number
-    assert [slot.holds and slot.holds.callback for slot in running.board.slots.values()] == ["bridge"] * 2
+    assert [slot.holds and slot.holds.callback for slot in running.board.slots.values()] == ["a", "b"]
     refused = running.ask(request(**{**ADD, "hmt": "/d", "smt": "/d"}))["refused"]
     assert refused.startswith("board 'board0' has no slot for a gateway: ")
     assert len(gateways(running.board)) == 2
@@ -157,7 +159,7 @@ def test_its_bitstream_is_written_and_what_comes_meanwhile_waits() -> None:
     board.hardware_topic("/d", word).subscribe(fifo)
     server = GatewayServer(board, types())
     started_ns = board.environment.now
-    server._add(memoryview(request(**{**ADD, "hmt": "/d", "smt": "/d"})))
+    server._add(memoryview(request(**{**ADD, "name": "d", "hmt": "/d", "smt": "/d"})))
     writer = board.writer(board.context.node("n"), word, "/d")
     for number in range(3):
         writer.send(writer.encode(word.cls(data=number)), Timeline(board.environment, started_ns))

@@ -192,6 +192,13 @@ def test_an_array_that_differs_is_computed_anew(other: Any) -> None:
     assert kernel.calls == 2
 
 
+def test_arrays_with_other_fields_are_different_arguments() -> None:
+    host = Host(VirtualEnvironment(), threads=None)
+    kind_of = attrgetter("dtype")  # one kernel
+    for name, kind in (("x", np.uint32), ("y", np.uint32), ("y", np.float32)):
+        assert host.compute(kind_of, GRID.view([(name, kind)])) == np.dtype([(name, kind)])
+
+
 def test_equal_arrays_are_equal_however_they_lie_in_memory() -> None:
     host = Host(VirtualEnvironment(), threads=None)
     kernel = Counting(np.sum)
@@ -296,6 +303,14 @@ def test_equal_numbers_of_different_types_are_different_arguments() -> None:
         type(number) for number in numbers
     ] * 2
     assert kernel.calls == 5
+
+
+@pytest.mark.parametrize("number", [float, np.float32, np.float64])
+def test_both_zeros_are_different_arguments(number: Callable[[float], Any]) -> None:
+    host = Host(VirtualEnvironment(), threads=None)
+    kernel = Counting(np.signbit)
+    assert [host.compute(kernel, number(zero)) for zero in (0.0, -0.0) * 2] == [False, True] * 2
+    assert kernel.calls == 2
 
 
 @pytest.mark.parametrize("threads", [None, 1])

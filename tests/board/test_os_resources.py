@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -63,6 +64,13 @@ def test_a_word_goes_from_slot_to_slot_and_waiting_is_a_stage() -> None:
     # Both bitstreams take 1000 ns, one after the other; the sender computes for 5000 ns and calls.
     assert stages(slots.sources["a"].timelines[0]) == {"reconfiguration": 1000, "execution": 5000, "osif": 7}
     assert stages(slots.sources["b"].timelines[0]) == {"reconfiguration": 2000, "osif": 7, "blocked": 4000}
+
+
+@pytest.mark.parametrize(("word", "got"), [(np.uint8(200), 200), (np.int32(-2), 2**32 - 2), (-2, 2**32 - 2)])
+def test_a_word_may_come_out_of_any_array_of_whole_numbers(word: Any, got: int) -> None:
+    mailbox = Mailbox(VirtualEnvironment(), 1)
+    assert mailbox.try_put(word)
+    assert mailbox.try_get() == got
 
 
 def test_a_full_mailbox_blocks_and_try_does_not() -> None:

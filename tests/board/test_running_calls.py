@@ -12,9 +12,10 @@ from reconros_zenoh.board.answers import StatusAnswer
 from reconros_zenoh.board.control import status
 from reconros_zenoh.board.executor import Executor
 from reconros_zenoh.board.hmt import FifoPlan, HmtSource, HmtWriter
-from reconros_zenoh.board.os_resources import Mailbox, Mutex, Semaphore
+from reconros_zenoh.board.os_resources import Condition, Mailbox, Mutex, Semaphore
 from reconros_zenoh.board.profile import read_profile
 from reconros_zenoh.board.sources import SubscriptionSource, TimerSource
+from reconros_zenoh.errors import CallbackError
 from reconros_zenoh.executor.callbacks import CallbackKind
 
 if TYPE_CHECKING:
@@ -83,6 +84,32 @@ def test_a_call_that_found_room_waits_for_nothing_any_more() -> None:
     assert running() == [None]
     board.environment.run(until=3000)
     assert running() == []
+
+
+@pytest.mark.parametrize(("wait", "until_ns"), [("a condition", 1500), ("a full stream", 2500)])
+def test_a_call_that_goes_on_after_an_error_waits_for_nothing_any_more(wait: str, until_ns: int) -> None:
+    board = small_board(small_profile({"a": (0, 5000)}), 1)
+    executor, source = Executor(board, 0, 1), Tickets(board)
+    condition = Condition(board.environment, Mutex(board.environment))
+    stream = board.hardware_topic("/x", WORD)
+    HmtSource(board, stream, FifoPlan(depth=1)).open(lambda: None)
+    writer = HmtWriter(stream)
+
+    def callback(thread: HardwareThread) -> Steps:
+        try:
+            while wait == "a full stream":
+                yield from thread.publish(writer, WORD.cls(data=1))
+            yield from thread.cond_wait(condition)
+        except CallbackError:
+            yield thread._environment.timeout(1000)
+
+    executor.add_hw_callback("a", [0], CallbackKind.TMR, source, callback, limit_ms=0.001)
+    executor.spin()
+    source.put("go")
+    # The bitstream takes 1000 ns, the limit ends after 1000 more.
+    board.environment.run(until=until_ns)
+    told: Any = executor.statistics()["a"]["running"]
+    assert told == [{"slot": 0, "since_ms": 0, "waits_for": None}]
 
 
 @pytest.mark.parametrize(

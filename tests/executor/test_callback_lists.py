@@ -81,6 +81,29 @@ def test_an_event_that_comes_while_the_callback_runs_waits_until_it_has_finished
 
 
 @pytest.mark.parametrize("kind", CallbackKind)
+def test_a_callback_whose_next_event_comes_while_one_is_taken_is_not_started_twice(
+    executor: CallbackLists, kind: CallbackKind
+) -> None:
+    class Stream(EventQueue):
+        """Lets the next event in as soon as one is taken."""
+
+        def take(self) -> object:
+            event = super().take()
+            executor.refresh(entry)
+            others.append(executor.select("second", SOFTWARE))
+            return event
+
+    others: list[object] = []
+    entry = callback("a", kind, Stream("first", "next"))
+    executor.add(entry)
+    dispatch = executor.select("first", SOFTWARE)
+    assert dispatch is not None
+    assert (dispatch.message, others) == ("first", [None])
+    executor.finish(dispatch)
+    assert serve(executor, "second") == "a"
+
+
+@pytest.mark.parametrize("kind", CallbackKind)
 def test_a_worker_gets_nothing_that_its_field_of_the_mask_does_not_hold(
     executor: CallbackLists, kind: CallbackKind
 ) -> None:
