@@ -45,6 +45,7 @@ _FIELDS = dict((*_SCALARS.values(), *_LISTS.values()))
 
 @dataclass(slots=True)
 class _Parameter:
+    kind: tuple[int, str]  # number and field of the type that it was declared with
     value: Value
     description: str
     on_set: Callable[[Any], None] | None
@@ -96,11 +97,11 @@ class Parameters:
         `on_set` is called with each new value before it is taken over; its UsageError refuses the value. It
         cannot declare or set parameters itself, which raises one.
         """
-        _kind(name, value)
+        kind = _kind(name, value)
         with self._changing():
             if name in self._parameters:
                 raise UsageError(f"parameter {name!r} is declared already.")
-            self._parameters[name] = _Parameter(value, description, on_set)
+            self._parameters[name] = _Parameter(kind, value, description, on_set)
             event = self._event([name], [])
         self._events.publish(event)
 
@@ -130,7 +131,9 @@ class Parameters:
 
     def _check(self, name: str, value: Value) -> None:
         parameter = self._declared(name)
-        if _kind(name, value) != _kind(name, parameter.value) and value != []:
+        # An empty list is one of any type: which one a sender takes it for says nothing.
+        is_empty_list = value == [] and isinstance(parameter.value, list)
+        if not is_empty_list and _kind(name, value) != parameter.kind:
             raise UsageError(
                 f"parameter {name!r} is {type(parameter.value).__name__}, not {type(value).__name__}."
             )
@@ -147,7 +150,7 @@ class Parameters:
         message = zero_message(self._value_type)
         if name in self._parameters:
             value: Any = self._parameters[name].value
-            message.type, field = _kind(name, value)
+            message.type, field = self._parameters[name].kind
             empty = getattr(message, field)
             if isinstance(empty, np.ndarray):
                 value = np.array(list(value), empty.dtype)

@@ -108,6 +108,16 @@ def test_setting(remote: Remote) -> None:
             assert remote.parameters.get(name) == value
 
 
+def test_an_empty_list_is_one_of_the_type_that_the_parameter_was_declared_with(remote: Remote) -> None:
+    assert remote.set("SetParameters", counts=[]).results[0].successful
+    assert remote.ask("GetParameterTypes", names=["counts"]).types.tolist() == [7]
+    assert remote.set("SetParameters", counts=[3]).results[0].successful
+    assert remote.parameters.get("counts") == [3]
+    refused = remote.set("SetParameters", count=[]).results[0]
+    assert (refused.successful, refused.reason) == (False, "parameter 'count' is int, not list.")
+    assert remote.parameters.get("count") == 3
+
+
 def test_setting_all_or_none(remote: Remote) -> None:
     assert not remote.set("SetParametersAtomically", count=7, flag=5).result.successful
     assert remote.parameters.get("count") == 3
