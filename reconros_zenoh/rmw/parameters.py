@@ -227,15 +227,17 @@ def _value(parameter: Any) -> Any:
 
 def _kind(name: str, value: Value) -> tuple[int, str]:
     """Return number and field of the value's type; raise UsageError for what no parameter can be."""
-    if isinstance(value, list):
-        kinds = {type(element) for element in value} or {str}
-        if len(kinds) == 1 and (kind := kinds.pop()) in _LISTS:
-            return _LISTS[kind]
-    elif type(value) in _SCALARS:
-        return _SCALARS[type(value)]
+    elements, known = (value, _LISTS) if isinstance(value, list) else ([value], _SCALARS)
+    kinds = {type(element) for element in elements} or {str}
+    if len(kinds) == 1 and (kind := kinds.pop()) in known and (kind is not int or _are_int64(elements)):
+        return known[kind]
     raise UsageError(
-        f"parameter {name!r} cannot be {value!r}: give a bool, int, float, str, bytes or a list."
+        f"parameter {name!r} cannot be {value!r}: give a bool, int of 64 bits, float, str, bytes or a list."
     )
+
+
+def _are_int64(numbers: Sequence[Any]) -> bool:
+    return all(-(2**63) <= number < 2**63 for number in numbers)
 
 
 def _is_listed(name: str, prefixes: Sequence[str], depth: int) -> bool:

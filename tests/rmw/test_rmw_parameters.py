@@ -165,10 +165,12 @@ def test_what_cannot_be_unset(remote: Remote) -> None:
     assert not remote.ask("SetParameters", parameters=[unset]).results[0].successful
 
 
-@pytest.mark.parametrize("value", [None, [1, "a"], {}, np.float32(1), [None]])
+@pytest.mark.parametrize("value", [None, [1, "a"], {}, np.float32(1), [None], 2**63, [0, -(2**63) - 1]])
 def test_what_no_parameter_can_be(value: Any) -> None:
+    parameters = Remote().parameters
     with pytest.raises(UsageError, match="cannot be"):
-        Remote().parameters.declare("x", value)
+        parameters.declare("x", value)
+    parameters.declare("x", [2**63 - 1, -(2**63)])
 
 
 def test_declared_twice(remote: Remote) -> None:
