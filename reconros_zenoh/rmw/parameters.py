@@ -172,7 +172,8 @@ class Parameters:
         response.types = np.array([self._message(name).type for name in request.names], np.uint8)
 
     def _list(self, request: Any, response: Any) -> None:
-        names = [name for name in self._parameters if _is_listed(name, request.prefixes, request.depth)]
+        # Another thread may declare one meanwhile.
+        names = [name for name in list(self._parameters) if _is_listed(name, request.prefixes, request.depth)]
         response.result.names = names
         parents = dict.fromkeys(name.rpartition(".")[0] for name in names)
         response.result.prefixes = [parent for parent in parents if parent]

@@ -9,6 +9,7 @@ import pytest
 from two_sessions import TwoSessions, types
 
 from reconros_zenoh.errors import UsageError
+from reconros_zenoh.rmw import parameters as parameters_module
 from reconros_zenoh.rmw.parameters import Parameters
 from reconros_zenoh.ros.graph import EndpointKind, EndpointToken, parse
 from reconros_zenoh.ros.qos import QosProfile
@@ -94,6 +95,18 @@ def test_the_list(remote: Remote, prefixes: list[str], depth: int, names: list[s
     result = remote.ask("ListParameters", prefixes=prefixes, depth=depth).result
     assert result.names == names
     assert set(result.prefixes) == {name.rpartition(".")[0] for name in names if "." in name}
+
+
+def test_a_parameter_may_be_declared_while_another_thread_lists_them(
+    remote: Remote, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def is_listed(name: str, *_: object) -> bool:
+        if name == "flag":
+            remote.parameters.declare("new", 1)  # as another thread may, at this very moment
+        return True
+
+    monkeypatch.setattr(parameters_module, "_is_listed", is_listed)
+    assert remote.ask("ListParameters", prefixes=[], depth=0).result.names == list(VALUES)
 
 
 def test_setting(remote: Remote) -> None:
