@@ -94,8 +94,9 @@ class Parameters:
     ) -> None:
         """Declare a parameter with its first value.
 
-        `on_set` is called with each new value before it is taken over; its UsageError refuses the value. It
-        cannot declare or set parameters itself, which raises one.
+        `on_set` is called with each new value before it is taken over; its UsageError refuses the value, and
+        any other exception that it raises becomes one. It cannot declare or set parameters itself, which
+        raises one.
         """
         kind = _kind(name, value)
         with self._changing():
@@ -138,7 +139,12 @@ class Parameters:
                 f"parameter {name!r} is {type(parameter.value).__name__}, not {type(value).__name__}."
             )
         if parameter.on_set is not None:
-            parameter.on_set(value)
+            try:
+                parameter.on_set(value)
+            except UsageError:
+                raise
+            except Exception as error:
+                raise UsageError(f"on_set of parameter {name!r} failed: {error!r}.") from error
 
     def _declared(self, name: str) -> _Parameter:
         if name not in self._parameters:

@@ -155,6 +155,15 @@ def test_a_callback_may_refuse_a_value() -> None:
         remote.parameters.set("count", -5)
 
 
+def test_a_callback_that_fails_refuses_the_value_and_says_why() -> None:
+    remote = Remote()
+    remote.parameters.declare("share", 1, lambda value: divmod(1, value))
+    result = remote.set("SetParameters", share=0).results[0]
+    assert not result.successful
+    assert result.reason.startswith("on_set of parameter 'share' failed: ZeroDivisionError(")
+    assert remote.parameters.get("share") == 1
+
+
 def test_a_callback_that_changes_parameters_itself_refuses_the_value() -> None:
     remote = Remote()
     parameters = remote.parameters
