@@ -131,7 +131,9 @@ class WallEnvironment(VirtualEnvironment):
         """
         while True:
             due = self.peek()
-            if self._inbox and self._inbox[0][0] <= due and time.monotonic_ns() <= deadline_ns:
+            if self._inbox and self._inbox[0][0] <= due:
+                if time.monotonic_ns() > deadline_ns:
+                    return self._inbox[0][0]
                 posted_ns, function, arguments = self._inbox.popleft()
                 self._now = max(self._now, posted_ns)
                 function(*arguments)
