@@ -87,6 +87,7 @@ class _Host(_Part):
     overrun_ms: float
     lag_p50_us: float | None
     lag_p99_us: float | None
+    real_time_priority: bool | None
 
 
 class StatusAnswer(_Part):

@@ -98,11 +98,13 @@ class ControlServer:
 def status(board: Board, executor: Executor) -> dict[str, Any]:
     """Return what the board is and what it has done so far; called by the thread of its event loop.
 
-    `host` says how well this host kept up: results later than the model had them ready (`overruns`) and how
-    late the event loop was (`lag_*`, wall time only). All times are since the board was made.
+    `host` says how well this host kept up: results later than the model had them ready (`overruns`), and, in
+    wall time only, how late the event loop was (`lag_*`) and whether it goes before other threads
+    (`real_time_priority`). All times are since the board was made.
     """
     overruns = board.host.overruns
-    lag = board.environment.lag() if isinstance(board.environment, WallEnvironment) else None
+    wall = board.environment if isinstance(board.environment, WallEnvironment) else None
+    lag = wall.lag() if wall else None
     return {
         "version": VERSION,
         "board": board.name,
@@ -136,6 +138,7 @@ def status(board: Board, executor: Executor) -> dict[str, Any]:
             "overrun_ms": overruns.total_ns / 1e6,
             "lag_p50_us": lag.p50_us if lag else None,
             "lag_p99_us": lag.p99_us if lag else None,
+            "real_time_priority": wall.has_real_time_priority if wall else None,
         },
     }
 

@@ -106,7 +106,10 @@ def _print_spans(console: Console, spans_ms: Mapping[str, Mapping[str, float]]) 
 
 
 def _print_host(console: Console, host: Mapping[str, Any]) -> None:
-    lag = "" if host["lag_p50_us"] is None else f"event loop late by {host['lag_p50_us']:.0f} us (median), "
+    lag = ""
+    if host["lag_p50_us"] is not None:
+        priority = "real-time" if host["real_time_priority"] else "normal"
+        lag = f"event loop ({priority} priority) late by {host['lag_p50_us']:.0f} us (median), "
     results = "1 result" if host["overruns"] == 1 else f"{host['overruns']} results"
     console.print(
         Text(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import sys
 import threading
 import time
 from collections import deque
@@ -54,6 +56,8 @@ class WallEnvironment(VirtualEnvironment):
     def __init__(self) -> None:
         super().__init__(time.monotonic_ns())
         self._inbox: deque[tuple[int, Callable[..., object], tuple[object, ...]]] = deque()
+        self.has_real_time_priority = False
+        """Whether the thread in `run` goes before those of normal priority, as it is when `run` begins."""
         self._turn = threading.Lock()
         self._turn.acquire()
         self._alarm = Alarm()
@@ -91,6 +95,7 @@ class WallEnvironment(VirtualEnvironment):
         if until.callbacks is not None:
             # It may happen in another thread's turn.
             until.callbacks.append(lambda _: self._alarm.ring())
+        self.has_real_time_priority = _has_real_time_priority()
         self._turn.release()
         try:
             while not until.processed:
@@ -126,7 +131,9 @@ class WallEnvironment(VirtualEnvironment):
         """
         while True:
             due = self.peek()
-            if self._inbox and self._inbox[0][0] <= due and time.monotonic_ns() <= deadline_ns:
+            if self._inbox and self._inbox[0][0] <= due:
+                if time.monotonic_ns() > deadline_ns:
+                    return self._inbox[0][0]
                 posted_ns, function, arguments = self._inbox.popleft()
                 self._now = max(self._now, posted_ns)
                 function(*arguments)
@@ -168,3 +175,10 @@ class WallEnvironment(VirtualEnvironment):
         """Adjust how long before an event a sleep is to end."""
         step_ns = _LEAD_STEP_NS * (is_late - _LATE_SLEEPS)
         self._lead_ns = min(max(self._lead_ns + step_ns, _LEAST_LEAD_NS), _MOST_LEAD_NS)
+
+
+def _has_real_time_priority() -> bool:
+    """Tell whether this thread goes before those of normal priority."""
+    if sys.platform != "linux":
+        return False
+    return os.sched_getscheduler(0) & ~os.SCHED_RESET_ON_FORK in {os.SCHED_FIFO, os.SCHED_RR}

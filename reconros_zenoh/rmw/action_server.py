@@ -135,9 +135,11 @@ class ActionServer:
             handle.status = handle.outcome
             self._results[handle.goal_id] = parts
             self._forget_old()
-            for responder in self._waiting.pop(handle.goal_id, ()):
-                responder.respond_encoded(parts)
-            self._publish_status()
+            waiting = self._waiting.pop(handle.goal_id, ())
+        # Not with the lock held: who gets the result may be in this session and send the next goal.
+        for responder in waiting:
+            responder.respond_encoded(parts)
+        self._publish_status()
 
     def fail(self, handle: GoalHandle) -> None:
         """End the goal as aborted, with a result of zeros."""

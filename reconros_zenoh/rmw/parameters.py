@@ -45,6 +45,7 @@ _FIELDS = dict((*_SCALARS.values(), *_LISTS.values()))
 
 @dataclass(slots=True)
 class _Parameter:
+    kind: tuple[int, str]  # number and field of the type that it was declared with
     value: Value
     description: str
     on_set: Callable[[Any], None] | None
@@ -93,14 +94,15 @@ class Parameters:
     ) -> None:
         """Declare a parameter with its first value.
 
-        `on_set` is called with each new value before it is taken over; its UsageError refuses the value. It
-        cannot declare or set parameters itself, which raises one.
+        `on_set` is called with each new value before it is taken over; its UsageError refuses the value, and
+        any other exception that it raises becomes one. It cannot declare or set parameters itself, which
+        raises one.
         """
-        _kind(name, value)
+        kind = _kind(name, value)
         with self._changing():
             if name in self._parameters:
                 raise UsageError(f"parameter {name!r} is declared already.")
-            self._parameters[name] = _Parameter(value, description, on_set)
+            self._parameters[name] = _Parameter(kind, value, description, on_set)
             event = self._event([name], [])
         self._events.publish(event)
 
@@ -130,12 +132,19 @@ class Parameters:
 
     def _check(self, name: str, value: Value) -> None:
         parameter = self._declared(name)
-        if _kind(name, value) != _kind(name, parameter.value) and value != []:
+        # An empty list is one of any type: which one a sender takes it for says nothing.
+        is_empty_list = value == [] and isinstance(parameter.value, list)
+        if not is_empty_list and _kind(name, value) != parameter.kind:
             raise UsageError(
                 f"parameter {name!r} is {type(parameter.value).__name__}, not {type(value).__name__}."
             )
         if parameter.on_set is not None:
-            parameter.on_set(value)
+            try:
+                parameter.on_set(value)
+            except UsageError:
+                raise
+            except Exception as error:
+                raise UsageError(f"on_set of parameter {name!r} failed: {error!r}.") from error
 
     def _declared(self, name: str) -> _Parameter:
         if name not in self._parameters:
@@ -147,7 +156,7 @@ class Parameters:
         message = zero_message(self._value_type)
         if name in self._parameters:
             value: Any = self._parameters[name].value
-            message.type, field = _kind(name, value)
+            message.type, field = self._parameters[name].kind
             empty = getattr(message, field)
             if isinstance(empty, np.ndarray):
                 value = np.array(list(value), empty.dtype)
@@ -169,7 +178,8 @@ class Parameters:
         response.types = np.array([self._message(name).type for name in request.names], np.uint8)
 
     def _list(self, request: Any, response: Any) -> None:
-        names = [name for name in self._parameters if _is_listed(name, request.prefixes, request.depth)]
+        # Another thread may declare one meanwhile.
+        names = [name for name in list(self._parameters) if _is_listed(name, request.prefixes, request.depth)]
         response.result.names = names
         parents = dict.fromkeys(name.rpartition(".")[0] for name in names)
         response.result.prefixes = [parent for parent in parents if parent]
@@ -224,15 +234,17 @@ def _value(parameter: Any) -> Any:
 
 def _kind(name: str, value: Value) -> tuple[int, str]:
     """Return number and field of the value's type; raise UsageError for what no parameter can be."""
-    if isinstance(value, list):
-        kinds = {type(element) for element in value} or {str}
-        if len(kinds) == 1 and (kind := kinds.pop()) in _LISTS:
-            return _LISTS[kind]
-    elif type(value) in _SCALARS:
-        return _SCALARS[type(value)]
+    elements, known = (value, _LISTS) if isinstance(value, list) else ([value], _SCALARS)
+    kinds = {type(element) for element in elements} or {str}
+    if len(kinds) == 1 and (kind := kinds.pop()) in known and (kind is not int or _are_int64(elements)):
+        return known[kind]
     raise UsageError(
-        f"parameter {name!r} cannot be {value!r}: give a bool, int, float, str, bytes or a list."
+        f"parameter {name!r} cannot be {value!r}: give a bool, int of 64 bits, float, str, bytes or a list."
     )
+
+
+def _are_int64(numbers: Sequence[Any]) -> bool:
+    return all(-(2**63) <= number < 2**63 for number in numbers)
 
 
 def _is_listed(name: str, prefixes: Sequence[str], depth: int) -> bool:

@@ -70,8 +70,10 @@ class QosProfile:
             if not isinstance(policy, policies):
                 known = " or ".join(f"{policies.__name__}.{known.name}" for known in policies)
                 raise UsageError(f"{name} is {policy!r}. Write {known}.")
-        if not isinstance(self.depth, int):
-            raise UsageError(f"depth is {self.depth!r}. Write a whole number.")
+        for name, largest in _NUMBERS.items():
+            number = getattr(self, name)
+            if not isinstance(number, int) or not 0 <= number <= largest:
+                raise UsageError(f"{name} is {number!r}. Write a whole number from 0 to {largest}.")
 
     @classmethod
     def or_default(cls, qos: QosProfile | None) -> QosProfile:
@@ -168,6 +170,12 @@ _POLICIES: Mapping[str, type[IntEnum]] = {
     "history": History,
 }
 _ENUMS: Mapping[str, type[IntEnum]] = {**_POLICIES, "liveliness": Liveliness}
+_NUMBERS = {
+    "depth": _LARGEST_DEPTH,
+    "deadline_ns": INFINITE_NS,
+    "lifespan_ns": INFINITE_NS,
+    "lease_ns": INFINITE_NS,
+}
 _RMW_DEFAULT = QosProfile(depth=42)
 # SYSTEM_DEFAULT and BEST_AVAILABLE of each policy
 _LEFT_OPEN: Mapping[type[IntEnum], tuple[str, ...]] = {

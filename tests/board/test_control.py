@@ -106,7 +106,13 @@ def test_the_status_of_a_board() -> None:
             "b": {"queue": 0.0, "dispatch": 0.0, "execution": 1.0, "overrun": 0.0},
         },
         "rejected": {},
-        "host": {"overruns": 0, "overrun_ms": 0.0, "lag_p50_us": None, "lag_p99_us": None},
+        "host": {
+            "overruns": 0,
+            "overrun_ms": 0.0,
+            "lag_p50_us": None,
+            "lag_p99_us": None,
+            "real_time_priority": None,
+        },
     }
 
 

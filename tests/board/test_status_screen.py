@@ -8,6 +8,13 @@ from rich.console import Console
 
 from reconros_zenoh.cli.status_screen import print_status
 
+HOST = {
+    "overruns": 5,
+    "overrun_ms": 1234.5,
+    "lag_p50_us": 31.4,
+    "lag_p99_us": 99.0,
+    "real_time_priority": True,
+}
 STATUS = {
     "board": "b",
     "profile": "native",
@@ -49,7 +56,7 @@ STATUS = {
     "hmt": {},
     "spans_ms": {"sobel": {"dds": 1.5, "memif": 0.25}},
     "rejected": {"truncated": 3},
-    "host": {"overruns": 5, "overrun_ms": 1234.5, "lag_p50_us": 31.4, "lag_p99_us": 99.0},
+    "host": HOST,
 }
 
 
@@ -73,8 +80,14 @@ def test_everything_that_the_board_told_is_shown() -> None:
     assert lines[head + 2 :][:3] == ["/out 2 0 1.5 2.25 10000", "/full 0 4 - - -", ""]
     assert "messages refused: truncated 3" in lines
     assert lines[-1] == (
-        "host: event loop late by 31 us (median), 5 results later than modelled (1234 ms in all)"
+        "host: event loop (real-time priority) late by 31 us (median), 5 results later than modelled "
+        "(1234 ms in all)"
     )
+
+
+def test_the_loop_of_a_board_may_have_normal_priority() -> None:
+    lines = printed(STATUS | {"host": HOST | {"real_time_priority": False}})
+    assert "event loop (normal priority) late by 31 us" in lines[-1]
 
 
 def test_what_there_is_nothing_of_is_left_out() -> None:

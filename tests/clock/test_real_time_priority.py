@@ -46,6 +46,18 @@ with real_time_priority():
     print(policy(), of_a_new_thread())
 print(policy(), of_a_new_thread())
 """
+TOLD = """
+from reconros_zenoh.clock.wall import WallEnvironment
+
+def told():
+    environment = WallEnvironment()
+    environment.run(until=environment.timeout(1))
+    return environment.has_real_time_priority
+
+with real_time_priority():
+    print(told())
+print(told())
+"""
 
 
 def output(*parts: str) -> list[str]:
@@ -58,9 +70,11 @@ def test_a_thread_has_it_meanwhile_and_those_that_it_starts_have_not() -> None:
         pytest.skip("this user may not have real-time priorities")
     assert output(POLICIES, USE) == ["normal", "first", "normal", "normal", "normal"]
     assert output(POLICIES, BATCH, USE) == ["batch", "first", "normal", "batch", "batch"]
+    assert output(POLICIES, TOLD) == ["True", "False"]
 
 
 def test_where_it_is_forbidden_all_stays_as_it_was() -> None:
     assert output(POLICIES, FORBID, ALLOWED) == ["forbidden"]
     assert output(POLICIES, FORBID, USE) == ["normal"] * 5
     assert output(POLICIES, FORBID, BATCH, USE) == ["batch"] * 5
+    assert output(POLICIES, FORBID, TOLD) == ["False"] * 2

@@ -216,6 +216,24 @@ def test_who_posts_is_not_kept_for_longer_than_a_turn() -> None:
     assert threads == [loop.ident]
 
 
+def test_who_posts_is_not_kept_for_longer_than_a_turn_by_what_is_posted_meanwhile() -> None:
+    environment = WallEnvironment()
+    sleeps = watch(environment)
+    end = environment.event()
+    threads: list[int] = []
+
+    def long() -> None:
+        environment.post(lambda: threads.append(get_ident()))
+        environment.post(end.succeed)
+        hold_until(time.monotonic_ns() + 2 * MS)
+
+    loop = start_loop(environment, end)
+    assert sleeps.wait(LIMIT_S)
+    environment.post(long)
+    join(loop)
+    assert threads == [loop.ident]
+
+
 def test_what_a_posted_call_raises_ends_the_run_and_never_hits_who_posts_it() -> None:
     environment = WallEnvironment()
     sleeps = watch(environment)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from threading import Thread
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,8 @@ from reconros_zenoh.rmw.action_server import STATUS_QOS, ActionServer, GoalHandl
 from reconros_zenoh.ros.zero_message import zero_message
 
 FIBONACCI = types().action("example_interfaces/action/Fibonacci")
+LIMIT_S = 5
+"""Of a wait that is over at once, unless the test fails."""
 
 
 def numbers(*values: int) -> Any:
@@ -214,6 +217,25 @@ def test_feedback_on_the_goals_of_others_is_not_heard() -> None:
     case.sessions.settle()
     assert case.kinds() == ["accepted", "feedback"]
     assert not other
+
+
+def test_who_gets_a_result_may_wait_for_what_another_thread_does_with_the_server() -> None:
+    case = Case()
+    case.send()
+    case.send()
+    ended, other = case.goals
+    threads: list[Thread] = []
+
+    class Waiting:
+        def respond_encoded(self, _: object) -> None:
+            threads.append(Thread(target=case.server.execute, args=(other,), daemon=True))
+            threads[0].start()
+            threads[0].join(LIMIT_S)
+
+    case.server._waiting[ended.goal_id].append(Waiting())  # type: ignore[arg-type] # it never fails
+    case.finish(ended)
+    assert not threads[0].is_alive()
+    assert other.status is GoalStatus.EXECUTING
 
 
 def test_old_results_are_forgotten() -> None:

@@ -9,6 +9,7 @@ import pytest
 from two_sessions import TwoSessions, types
 
 from reconros_zenoh.errors import UsageError
+from reconros_zenoh.rmw import parameters as parameters_module
 from reconros_zenoh.rmw.parameters import Parameters
 from reconros_zenoh.ros.graph import EndpointKind, EndpointToken, parse
 from reconros_zenoh.ros.qos import QosProfile
@@ -96,6 +97,18 @@ def test_the_list(remote: Remote, prefixes: list[str], depth: int, names: list[s
     assert set(result.prefixes) == {name.rpartition(".")[0] for name in names if "." in name}
 
 
+def test_a_parameter_may_be_declared_while_another_thread_lists_them(
+    remote: Remote, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def is_listed(name: str, *_: object) -> bool:
+        if name == "flag":
+            remote.parameters.declare("new", 1)  # as another thread may, at this very moment
+        return True
+
+    monkeypatch.setattr(parameters_module, "_is_listed", is_listed)
+    assert remote.ask("ListParameters", prefixes=[], depth=0).result.names == list(VALUES)
+
+
 def test_setting(remote: Remote) -> None:
     results = remote.set("SetParameters", count=7, flag=5, unknown=1).results
     assert [result.successful for result in results] == [True, False, False]
@@ -106,6 +119,16 @@ def test_setting(remote: Remote) -> None:
         if "." not in name:
             assert remote.set("SetParameters", **{name: value}).results[0].successful
             assert remote.parameters.get(name) == value
+
+
+def test_an_empty_list_is_one_of_the_type_that_the_parameter_was_declared_with(remote: Remote) -> None:
+    assert remote.set("SetParameters", counts=[]).results[0].successful
+    assert remote.ask("GetParameterTypes", names=["counts"]).types.tolist() == [7]
+    assert remote.set("SetParameters", counts=[3]).results[0].successful
+    assert remote.parameters.get("counts") == [3]
+    refused = remote.set("SetParameters", count=[]).results[0]
+    assert (refused.successful, refused.reason) == (False, "parameter 'count' is int, not list.")
+    assert remote.parameters.get("count") == 3
 
 
 def test_setting_all_or_none(remote: Remote) -> None:
@@ -132,6 +155,15 @@ def test_a_callback_may_refuse_a_value() -> None:
         remote.parameters.set("count", -5)
 
 
+def test_a_callback_that_fails_refuses_the_value_and_says_why() -> None:
+    remote = Remote()
+    remote.parameters.declare("share", 1, lambda value: divmod(1, value))
+    result = remote.set("SetParameters", share=0).results[0]
+    assert not result.successful
+    assert result.reason.startswith("on_set of parameter 'share' failed: ZeroDivisionError(")
+    assert remote.parameters.get("share") == 1
+
+
 def test_a_callback_that_changes_parameters_itself_refuses_the_value() -> None:
     remote = Remote()
     parameters = remote.parameters
@@ -155,10 +187,12 @@ def test_what_cannot_be_unset(remote: Remote) -> None:
     assert not remote.ask("SetParameters", parameters=[unset]).results[0].successful
 
 
-@pytest.mark.parametrize("value", [None, [1, "a"], {}, np.float32(1), [None]])
+@pytest.mark.parametrize("value", [None, [1, "a"], {}, np.float32(1), [None], 2**63, [0, -(2**63) - 1]])
 def test_what_no_parameter_can_be(value: Any) -> None:
+    parameters = Remote().parameters
     with pytest.raises(UsageError, match="cannot be"):
-        Remote().parameters.declare("x", value)
+        parameters.declare("x", value)
+    parameters.declare("x", [2**63 - 1, -(2**63)])
 
 
 def test_declared_twice(remote: Remote) -> None:

@@ -139,8 +139,13 @@ def test_a_profile_of_qos_is_made_of_its_policies() -> None:
         ("durability", 1): "Write Durability.TRANSIENT_LOCAL or Durability.VOLATILE.",
         ("history", None): "Write History.KEEP_LAST or History.KEEP_ALL.",
         ("liveliness", "automatic"): "Write Liveliness.AUTOMATIC or Liveliness.MANUAL_BY_TOPIC.",
-        ("depth", "10"): "Write a whole number.",
-        ("depth", 1.5): "Write a whole number.",
+        ("depth", "10"): "Write a whole number from 0 to 18446744073709551615.",
+        ("depth", 1.5): "Write a whole number from 0 to 18446744073709551615.",
+        ("depth", -1): "Write a whole number from 0 to 18446744073709551615.",
+        ("depth", 2**64): "Write a whole number from 0 to 18446744073709551615.",
+        ("deadline_ns", -1): "Write a whole number from 0 to 9223372036854775807.",
+        ("lifespan_ns", 0.5): "Write a whole number from 0 to 9223372036854775807.",
+        ("lease_ns", 2**63): "Write a whole number from 0 to 9223372036854775807.",
     }.items():
         name, value = policies
         with pytest.raises(UsageError) as caught:

@@ -64,5 +64,6 @@ def test_the_loop_of_a_board_has_real_time_priority_where_it_may_and_has_a_model
 ) -> None:
     with Process("board", "--router", network.endpoint, "--name", "board1", "--profile", profile) as board:
         board.wait_for("serves")
-        ask_status(network.transport, "board1")  # its loop runs
+        host = ask_status(network.transport, "board1")["host"]  # its loop runs
         assert is_first(board.pid) == (has_times_to_keep and may_be_first())
+        assert host["real_time_priority"] == is_first(board.pid)
