@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar, cast
 
 if TYPE_CHECKING:
@@ -43,37 +44,35 @@ PARK = Signal()
 def limited(
     steps: Generator[Awaitable, Any, R], deadline: Signal, error: Callable[[], Exception]
 ) -> Generator[Awaitable, Any, R]:
-    """Return what the steps return; when the deadline happens before they end, raise the error in them.
+    """Return what the steps return; when the deadline happens before they end, raise the error.
 
-    They may wait once more to put things in order; then they are closed. Steps that never wait cannot be
-    stopped. What they yield that cannot be waited for is refused as an `Activity` does.
+    It is raised in the steps first, which may wait once more to put things in order; then they are closed.
+    Steps that never wait cannot be stopped. What they yield that cannot be waited for is refused as an
+    `Activity` does.
     """
-    failure: Exception | None = None
-    in_order = False
     try:
-        waited_for: Awaitable | _Refused = next(steps)
+        awaited: Awaitable | _Refused = next(steps)
         while True:
-            if not hasattr(waited_for, "callbacks"):
-                waited_for = _Refused(waited_for)
-            if waited_for.callbacks is not None and deadline.callbacks is not None:
-                yield _first(waited_for, deadline)
-            if waited_for.callbacks is not None:
-                if failure is None:
-                    failure = error()
-                    waited_for = steps.throw(failure)
-                    continue
-                if in_order:
-                    steps.close()
-                    raise failure
-                in_order = True
-                yield waited_for
-            if waited_for.ok:
-                waited_for = steps.send(waited_for.value)
+            if not hasattr(awaited, "callbacks"):
+                awaited = _Refused(awaited)
+            if awaited.callbacks is not None and deadline.callbacks is not None:
+                yield _first(awaited, deadline)
+            if awaited.callbacks is not None:
+                break
+            if awaited.ok:
+                awaited = steps.send(awaited.value)
             else:
-                cast("simpy.Event", waited_for).defused = True
-                waited_for = steps.throw(cast("BaseException", waited_for.value))
+                cast("simpy.Event", awaited).defused = True
+                awaited = steps.throw(cast("BaseException", awaited.value))
     except StopIteration as end:
         return cast("R", end.value)
+    failure = error()
+    # Steps that swallow the error, or raise another, are too late all the same.
+    with suppress(Exception):
+        value = yield steps.throw(failure)
+        steps.send(value)
+    steps.close()
+    raise failure
 
 
 def _first(event: Awaitable, deadline: Signal) -> Signal:

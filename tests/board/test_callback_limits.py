@@ -18,10 +18,13 @@ from reconros_zenoh.errors import CallbackError, UsageError
 from reconros_zenoh.executor.callbacks import CallbackKind
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+
     from small_board import Steps
 
     from reconros_zenoh.board.callback import HardwareThread
     from reconros_zenoh.board.software import SoftwareContext
+    from reconros_zenoh.clock.activity import Awaitable
 
 SUB = CallbackKind.SUB
 PROFILE = small_profile({"a": (100, 100), "b": (100, 100)}, cores=1)
@@ -194,3 +197,22 @@ def test_steps_that_catch_everything_are_stopped() -> None:
     board.environment.run(until=100_000)
     assert executor.failures == {"a": 1}
     assert board.slots[0].busy.ns == 1010
+
+
+@pytest.mark.parametrize("end", [lambda _: (), lambda thread: thread.exit()])
+def test_a_call_that_catches_the_error_of_its_limit_and_ends_is_failed(
+    end: Callable[[HardwareThread], Iterable[Awaitable]],
+) -> None:
+    def satisfied(thread: HardwareThread) -> Steps:
+        try:
+            yield from thread.compute_cycles(10_000)
+        except Exception:  # noqa: BLE001 - what is tested
+            yield from end(thread)
+
+    board = small_board(PROFILE, 1)
+    executor, source = Executor(board, 0, 1), Tickets(board)
+    executor.add_hw_callback("a", [0], SUB, source, satisfied, timing=Cycles(0), limit_ms=0.001)
+    executor.spin()
+    source.put(1)
+    board.environment.run(until=100_000)
+    assert executor.failures == {"a": 1}
