@@ -207,6 +207,24 @@ def test_down_without_a_file_stops_the_one_that_is_running(
     }
 
 
+@pytest.mark.parametrize("options", [(), ("--json",)])
+def test_down_of_a_file_that_is_not_there_is_a_mistake(
+    run: Run, tmp_path: Path, options: tuple[str, ...]
+) -> None:
+    misspelt = tmp_path / "misspelt.yaml"
+    down = run("down", *options, file=misspelt)
+    assert (down.returncode, down.stdout) == (2, "")
+    assert down.stderr == f"{misspelt}: is not there, and nothing of it is running. Correct the name.\n"
+
+
+def test_down_stops_what_runs_of_a_file_that_is_gone(services: Services, run: Run) -> None:
+    _server_and(services, "block()")
+    assert run("up", "-d").returncode == 0
+    (services.folder / "compose.yaml").unlink()
+    assert run("down").returncode == 0
+    services.assert_gone()
+
+
 def test_a_record_of_another_version_is_named(services: Services, run: Run, tmp_path: Path) -> None:
     _server_and(services, "block()")
     folder = StateFolder(services.folder / "compose.yaml", {"XDG_STATE_HOME": str(tmp_path / "state")})
