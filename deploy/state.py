@@ -147,7 +147,7 @@ def _owner(lock: BinaryIO) -> int | None:
 def _read(record: Path) -> DeploymentRecord:
     try:
         return DeploymentRecord(**json.loads(record.read_text(encoding="utf-8")))
-    except TypeError:
+    except (TypeError, ValueError):  # a host that lost power may leave it empty
         raise FileError(
-            record, None, "was written by another version of reconros.", "Use that one, or remove the file."
+            record, None, "is not what this version of reconros writes.", "Use the other, or remove the file."
         ) from None

@@ -225,16 +225,19 @@ def test_down_stops_what_runs_of_a_file_that_is_gone(services: Services, run: Ru
     services.assert_gone()
 
 
-def test_a_record_of_another_version_is_named(services: Services, run: Run, tmp_path: Path) -> None:
+@pytest.mark.parametrize("content", ['{"pid": 1, "states": {}, "error": ""}', ""])
+def test_a_record_of_another_version_or_an_empty_one_is_named(
+    services: Services, run: Run, tmp_path: Path, content: str
+) -> None:
     _server_and(services, "block()")
     folder = StateFolder(services.folder / "compose.yaml", {"XDG_STATE_HOME": str(tmp_path / "state")})
     with folder.claimed():
         pass
     record = folder.path / "record.json"
-    record.write_text('{"pid": 1, "states": {}, "error": ""}')
+    record.write_text(content)
     down = run("down")
     assert (down.returncode, down.stdout) == (2, "")
-    assert f"{record}: was written by another version of reconros." in down.stderr
+    assert f"{record}: is not what this version of reconros writes." in down.stderr
 
 
 def test_down_stops_a_foreground_up_too(services: Services, start: Start, run: Run) -> None:
