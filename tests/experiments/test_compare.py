@@ -19,6 +19,7 @@ from reconros_zenoh.ros.type_registry import TypeRegistry
 from reconros_zenoh.ros.zero_message import message_of
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from pathlib import Path
 
 MAPPINGS = ["all_hardware", "all_software", "mixed"]
@@ -44,8 +45,10 @@ def round_trips(out: Path, *arguments: object) -> dict[str, Any]:
     return experiment
 
 
-def write_bag(path: Path, messages: list[tuple[str, str, int, dict[str, Any]]], digest: str = "") -> Path:
-    """Write a recording of messages: topic, type, time [ms] and fields."""
+def write_bag(
+    path: Path, messages: Sequence[tuple[str, str, int | None, dict[str, Any]]], digest: str = ""
+) -> Path:
+    """Write a recording of messages: topic, type, time [ms], None for a topic without any, and fields."""
     with Writer(path, version=9) as bag:
         connections: dict[str, Any] = {}
         for topic, name, at_ms, fields in messages:
@@ -54,8 +57,9 @@ def write_bag(path: Path, messages: list[tuple[str, str, int, dict[str, Any]]], 
                 connections[topic] = bag.add_connection(
                     topic, name, msgdef="uint32 data", rihs01=digest or kind.type_hash
                 )
-            payload = b"".join(kind.encode(message_of(kind, fields)))
-            bag.write(connections[topic], 10**18 + at_ms * 10**6, payload)
+            if at_ms is not None:
+                payload = b"".join(kind.encode(message_of(kind, fields)))
+                bag.write(connections[topic], 10**18 + at_ms * 10**6, payload)
     return path
 
 
@@ -175,9 +179,27 @@ def test_what_cannot_be_used_is_told(tmp_path: Path, arguments: list[str], says:
     assert says in str(caught.value)
 
 
+def test_a_recording_of_one_message_needs_seconds(tmp_path: Path) -> None:
+    bag = write_bag(tmp_path / "bag", [("/angle", WORD, 0, {"data": 80})])
+    with pytest.raises(UsageError, match=r"bag is over at once. Say with --seconds"):
+        round_trips(tmp_path / "out", "--bag", bag)
+    told = round_trips(tmp_path / "out", "--bag", bag, "--mapping", "mixed", "--seconds", 0.1)
+    assert told["mappings"]["mixed"]["outputs"]["/legangle"]["sent"] == 1
+
+
+def test_a_recorded_topic_without_messages_is_silent(tmp_path: Path) -> None:
+    empty = ("/image_raw", "sensor_msgs/msg/Image", None, {})
+    bag = write_bag(tmp_path / "empty", [empty])
+    with pytest.raises(UsageError, match=r"has no message that the project waits for. It has: none"):
+        round_trips(tmp_path / "out", "--bag", bag)
+    bag = write_bag(tmp_path / "heard", [empty, ("/angle", WORD, 0, {})])
+    told = round_trips(tmp_path / "out", "--bag", bag, "--mapping", "mixed", "--seconds", 0.01)
+    assert told["silent"] == ["/image_classification", "/image_raw"]
+
+
 def test_recordings_of_other_topics_or_types_are_refused(tmp_path: Path) -> None:
     other = write_bag(tmp_path / "other", [("/else", WORD, 0, {})])
-    with pytest.raises(UsageError, match=r"has no topic that the project waits for. It has: /else"):
+    with pytest.raises(UsageError, match=r"has no message that the project waits for. It has: /else"):
         round_trips(tmp_path / "out", "--bag", other)
     wrong = write_bag(tmp_path / "wrong", [("/angle", "std_msgs/msg/Int32", 0, {})])
     with pytest.raises(UsageError, match="was recorded as std_msgs/msg/Int32"):
