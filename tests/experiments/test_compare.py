@@ -146,6 +146,29 @@ def test_a_project_that_drives_itself_needs_no_input(tmp_path: Path) -> None:
     assert rows == [["/count", "hardware", "9.524"], ["/count", "software", "9.524"]]
 
 
+def test_what_a_publisher_pushes_out_is_lost(tmp_path: Path) -> None:
+    project = tmp_path / "blink"
+    new_project(project)
+    (project / "msg" / "blink_msgs" / "msg" / "Count.msg").write_text("uint8[1000000] count\n")
+    (project / "main.py").write_text(
+        "import numpy as np\n"
+        "from reconros_zenoh import Cycles\n"
+        "def main(app):\n"
+        "    pub = app.writer('count', 'pub')\n"
+        "    def software(message, context):\n"
+        "        context.publish(pub, pub.message(count=np.zeros(1_000_000, np.uint8)))\n"
+        "    app.register('count', 'timer', software=software, software_timing=Cycles(1000))\n"
+        "    app.spin()\n"
+    )
+    given = ("--profile", "miniitx-zynq7100", "--mapping", "software", "--seconds", 1.95)
+    faster = (project / "build.cfg").read_text().replace("rostmr, node, 100", "rostmr, node, 10")
+    (project / "build.cfg").write_text(faster)
+    told = json.loads(run(project, tmp_path / "out", "--json", *given))["mappings"]["software"]
+    calls = told["status"]["callbacks"]["count"]["calls"]
+    assert told["dropped"] > 100
+    assert told["outputs"]["/count"]["sent"] + told["dropped"] == pytest.approx(calls, abs=12)  # on their way
+
+
 def test_where_nothing_leaves_the_board_nothing_is_drawn(tmp_path: Path) -> None:
     (tmp_path / "compare.png").write_text("of an earlier run")
     shown = run(application_folder(), tmp_path, "--seconds", 0.1, "--mapping", "mixed")
