@@ -353,19 +353,19 @@ def test_a_full_disk_below_the_state_is_told(services: Services, run: Run, optio
     _server_and(services, "block()")
     state = StateFolder(services.folder / "compose.yaml", {"XDG_STATE_HOME": str(services.folder / "state")})
     state.make()
-    (state.path / "record.new").symlink_to("/dev/full")
+    (state.path / "record.json.partial").symlink_to("/dev/full")
     (state.path / "supervisor.log").symlink_to("/dev/full")
     up = run("up", *options)
     assert (up.returncode, up.stdout) == (2, "")
     assert up.stderr == (
-        f"{state.path / 'record.new'}: cannot be written (No space left on device). "
+        f"{state.path / 'record.json'}: cannot be written (No space left on device). "
         "Make room, or set XDG_STATE_HOME to another folder.\n"
     )
 
 
 def test_a_disk_that_gets_full_does_not_hide_what_failed(services: Services, run: Run) -> None:
     state = StateFolder(services.folder / "compose.yaml", {"XDG_STATE_HOME": str(services.folder / "state")})
-    program = f"pathlib.Path({str(state.path)!r}, 'record.new').symlink_to('/dev/full'); sys.exit(9)"
+    program = f"pathlib.Path({str(state.path)!r}, 'record.json.partial').symlink_to('/dev/full'); sys.exit(9)"
     services.compose_file(services.service("server", program))
     up = run("up")
     assert (up.returncode, up.stderr.splitlines()[0]) == (1, "Service server ended with status 9.")
