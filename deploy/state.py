@@ -15,6 +15,7 @@ from shlex import quote
 from typing import TYPE_CHECKING
 
 from reconros_zenoh.errors import FileError, UsageError
+from reconros_zenoh.text_file import replacing
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -81,13 +82,12 @@ class StateFolder:
     def leave(self, states: Mapping[str, str], error: str) -> None:
         """Record how the owner, this process, leaves the deployment; raise FileError if it cannot."""
         record = DeploymentRecord(str(self._compose_file.resolve()), states, error)
-        new = self._record.with_suffix(".new")
         try:
-            new.write_text(json.dumps(asdict(record)), encoding="utf-8")
-            new.replace(self._record)  # at once, so that nobody reads half a record
+            with replacing(self._record) as new:
+                new.write_text(json.dumps(asdict(record)), encoding="utf-8")
         except OSError as failure:
             raise FileError(
-                new,
+                self._record,
                 None,
                 f"cannot be written ({failure.strerror}).",
                 "Make room, or set XDG_STATE_HOME to another folder.",
@@ -147,7 +147,7 @@ def _owner(lock: BinaryIO) -> int | None:
 def _read(record: Path) -> DeploymentRecord:
     try:
         return DeploymentRecord(**json.loads(record.read_text(encoding="utf-8")))
-    except TypeError:
+    except (TypeError, ValueError):  # a host that lost power may leave it empty
         raise FileError(
-            record, None, "was written by another version of reconros.", "Use that one, or remove the file."
+            record, None, "is not what this version of reconros writes.", "Use the other, or remove the file."
         ) from None

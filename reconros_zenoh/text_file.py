@@ -1,13 +1,15 @@
-"""Reading a text file that somebody gave, so that a failure names the file and nothing is waited for."""
+"""Text files: reading those that somebody gave, without waiting for what never ends; and replacing them."""
 
 from __future__ import annotations
 
 import stat
+from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from reconros_zenoh.errors import FileError
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
     from pathlib import Path
 
 _LIMIT_BYTES = 1_000_000
@@ -63,6 +65,20 @@ def check_file(path: Path, remedy: str, limit_bytes: int) -> None:
         raise FileError(
             path, None, f"cannot be read: it has {size:.1f} MB, and {limit:g} MB is the limit.", remedy
         )
+
+
+@contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """Give a file to write; it becomes `path` if the block ends well, otherwise nothing is left of it.
+
+    So nobody reads half of a file, and an older one stays until it is replaced.
+    """
+    partial = path.with_name(f"{path.name}.partial")
+    try:
+        yield partial
+        partial.replace(path)
+    finally:
+        partial.unlink(missing_ok=True)
 
 
 def _read(path: Path, remedy: str, limit_bytes: int) -> bytes:

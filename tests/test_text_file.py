@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from reconros_zenoh.errors import FileError
-from reconros_zenoh.text_file import read_old_text_file, read_text_file
+from reconros_zenoh.text_file import read_old_text_file, read_text_file, replacing
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -70,3 +70,20 @@ def test_an_error_quotes_no_whole_file(path: Path) -> None:
     error = FileError(path, 7, f"{'x' * 1_000_000!r} is not a time in ms.")
     assert len(error.problem) < 700
     assert error.problem.endswith("x' is not a time in ms.")
+
+
+def test_a_file_is_replaced_by_a_complete_one(path: Path) -> None:
+    path.write_text("old")
+    with replacing(path) as partial:
+        partial.write_text("new")
+        assert path.read_text() == "old"
+    assert path.read_text() == "new"
+    assert list(path.parent.iterdir()) == [path]
+
+
+def test_of_a_file_that_could_not_be_written_nothing_is_left(path: Path) -> None:
+    path.write_text("old")
+    with pytest.raises(UnicodeEncodeError), replacing(path) as partial:
+        partial.write_text("new \N{SNOWMAN}", encoding="latin-1")
+    assert path.read_text() == "old"
+    assert list(path.parent.iterdir()) == [path]

@@ -22,7 +22,7 @@ from reconros_zenoh.experiments.calibration import (
 from reconros_zenoh.experiments.calibration import calibrate as fit
 from reconros_zenoh.experiments.interruption import until_interrupted
 from reconros_zenoh.experiments.measured import read_measurements
-from reconros_zenoh.experiments.profile_file import replacing, with_values
+from reconros_zenoh.experiments.profile_file import new_profile, with_values
 from reconros_zenoh.experiments.roundtrip import application
 from reconros_zenoh.measure.compare import error_text
 from reconros_zenoh.measure.statistics import format_ms
@@ -79,7 +79,7 @@ def calibrate(
     constants = calibrated_constants(start)
     project = application()
     measured = read_measurements([*data, *(more_data or [])], project, _assignments(mapping or []), trim=trim)
-    with replacing(out) as file:
+    with new_profile(out) as file:
         total = planned_evaluations(constants, rounds)
         with (
             run_bar(f"fitting {len(constants)} constants", total, quiet=as_json) as advance,

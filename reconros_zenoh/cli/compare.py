@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 _DRAWING = "compare.png"
 _TRACE = "trace.png"
 _SECONDS = 10.0
+_SHORTEST_S = 0.001
 
 
 def compare(
@@ -61,7 +62,7 @@ def compare(
     seconds: Annotated[
         float | None,
         typer.Option(
-            min=0.001,
+            min=_SHORTEST_S,
             max=1e6,
             help="How long, in virtual time.",
             show_default=f"{_SECONDS:g}; with a bag, its length",
@@ -93,6 +94,8 @@ def compare(
         recorded, length_s = bag_topics(bag, known, loaded.types()) if bag else ({}, _SECONDS)
         heard = {topic: name for topic, name in known.items() if topic in messages or topic in recorded}
         stimulus = Stimulus(heard, messages, round(1e9 / rate), bag)
+        if seconds is None and length_s < _SHORTEST_S:
+            raise UsageError(f"{bag} is over at once. Say with --seconds how long to go on after its start.")
         seconds = seconds or length_s
         runs: dict[str, MappingRun] = {}
         with (

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import signal
 from contextlib import suppress
-from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
@@ -29,19 +28,9 @@ from reconros_zenoh.cli.options import (
 )
 from reconros_zenoh.cli.status_screen import print_status
 from reconros_zenoh.clock.signals import ending_signals
-from reconros_zenoh.experiments.roundtrip import application_folder
+from reconros_zenoh.experiments.roundtrip import Client, application_folder
 from reconros_zenoh.transport.zenoh import ZenohRouter, ZenohTransport
 from reconros_zenoh.transport.zenoh_session import use_threads_of_a_router
-
-
-class ClientName(StrEnum):
-    """The five clients."""
-
-    SORT = "sort"
-    INVERSE = "inverse"
-    SOBEL = "sobel"
-    MNIST = "mnist"
-    HASH = "hash"
 
 
 def router(
@@ -106,7 +95,7 @@ def board(
 
 
 def client(
-    name: Annotated[ClientName, typer.Argument(help="Which client.")],
+    name: Annotated[Client, typer.Argument(help="Which client.")],
     requests: Annotated[int, typer.Option(min=1, help="How many round trips to make.")] = 100,
     router: Router = ENDPOINT,
     domain: Domain = 0,
@@ -137,7 +126,7 @@ def client(
     from host_clients.command import make_round_trips
     from host_clients.daemon import ClientOptions
 
-    options = ClientOptions(str(name), requests, limit, wait, domain, seed, group, members)
+    options = ClientOptions(name, requests, limit, wait, domain, seed, group, members)
     raise typer.Exit(make_round_trips(router, options, out, as_json=as_json))
 
 

@@ -68,10 +68,12 @@ def main() -> None:
         except typer.TyperException as error:
             error.show()  # type: ignore[attr-defined] # those of the command line have it
             _end(error.format_message(), error.exit_code)
-        except (UsageError, TransportError) as error:
-            _fail(error, 2)
         except ReconrosError as error:
-            _fail(error, 1)
+            _fail(str(error), 2 if isinstance(error, UsageError | TransportError) else 1)
+        except OSError as error:
+            if error.filename is None:  # the output
+                raise
+            _fail(f"{error.filename}: {error.strerror}", 1)
         finally:
             sys.stdout.flush()
     except KeyboardInterrupt:
@@ -81,8 +83,7 @@ def main() -> None:
         sys.exit(1)
     except OSError as error:  # a full disk, for example
         drop_output()
-        place = error.filename or "the output cannot be written"
-        print(f"reconros: {place}: {error.strerror}", file=sys.stderr)
+        print(f"reconros: the output cannot be written: {error.strerror}", file=sys.stderr)
         sys.exit(1)
     finally:
         # Python gives its handlers back before it ends: a second signal would kill it and change the status.
@@ -110,9 +111,9 @@ def _application(verbs: list[str]) -> typer.Typer:
     return application
 
 
-def _fail(error: ReconrosError, status: int) -> NoReturn:
-    print(f"reconros: {printable(str(error))}", file=sys.stderr)
-    _end(str(error), status)
+def _fail(error: str, status: int) -> NoReturn:
+    print(f"reconros: {printable(error)}", file=sys.stderr)
+    _end(error, status)
 
 
 def _end(error: str, status: int) -> NoReturn:

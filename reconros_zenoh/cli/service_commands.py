@@ -70,7 +70,7 @@ def read_deployment(path: Path, environment: Mapping[str, str], *, has_end: bool
             boards[name] = board
         elif verb == "client":
             clients[name] = ClientOptions(
-                str(given["name"]),
+                given["name"],
                 given["requests"],
                 given["limit"],
                 given["wait"],

@@ -16,7 +16,7 @@ from deploy.state import StateFolder, running
 from deploy.supervisor import start_supervisor, supervise
 from reconros_zenoh.cli.console import PlainConsole
 from reconros_zenoh.cli.service_screen import ServiceScreen
-from reconros_zenoh.errors import ExperimentError, UsageError
+from reconros_zenoh.errors import ExperimentError, FileError, UsageError
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -76,6 +76,8 @@ def down(
     file = file or _the_one_running()
     folder = StateFolder(file, os.environ) if file else None
     record = folder.end_owner() if folder else None
+    if file and record is None and not file.exists():  # of a file that is gone the deployment may still run
+        raise FileError(file, None, "is not there, and nothing of it is running.", "Correct the name.")
     if as_json:
         states, error = (record.states, record.error) if record else ({}, "")
         _print_json(file, folder, states, error)

@@ -54,7 +54,7 @@ class MappingRun:
                 )
                 for topic, ages_ns in self.ages_ns.items()
             },
-            "dropped": sum(callback["dropped"] for callback in callbacks),
+            "dropped": sum(each["dropped"] for each in (*callbacks, *published.values())),
             "refused": sum(self.status["rejected"].values()),
             "failed": sum(callback["failed"] for callback in callbacks),
             "reconfigurations": sum(slot["reconfigurations"] for slot in slots),

@@ -12,6 +12,7 @@ from pydantic import ValidationError
 from reconros_zenoh.board.profile import Profile
 from reconros_zenoh.errors import FileError, UsageError
 from reconros_zenoh.experiments.provenance import writing
+from reconros_zenoh.text_file import replacing
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -64,23 +65,18 @@ def with_values(source: TomlFile, values: Mapping[tuple[str, ...], float], profi
 
 
 @contextmanager
-def replacing(path: Path) -> Iterator[Path]:
-    """Give a file to write; it becomes `path` if the block ends well, otherwise nothing is left of it.
+def new_profile(path: Path) -> Iterator[Path]:
+    """Give a file to write, as `replacing` does; raise UsageError when `path` cannot be written.
 
-    Raise UsageError at once if `path` cannot be written, so that no work is lost.
+    At once if possible, so that no work is lost.
     """
-    partial = path.with_name(f"{path.name}.partial")
     with writing(path):
         if path.is_dir():
             raise UsageError(f"{path} is a folder. Name the file of the new profile.")
         path.parent.mkdir(parents=True, exist_ok=True)
-        partial.touch()
-    try:
-        with writing(path):
+        with replacing(path) as partial:
+            partial.touch()
             yield partial
-            partial.replace(path)
-    finally:
-        partial.unlink(missing_ok=True)
 
 
 def _not_replaceable(source: TomlFile, place: tuple[str, ...]) -> FileError:

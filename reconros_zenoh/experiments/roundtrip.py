@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from reconros_zenoh.board.profile import read_profile
 from reconros_zenoh.experiments.provenance import host, provenance, write_experiment, writing
@@ -20,7 +20,8 @@ if TYPE_CHECKING:
     from reconros_zenoh.measure.record import Record
     from reconros_zenoh.project.loader import Project
 
-CLIENTS = ("inverse", "mnist", "sobel", "sort", "hash")
+Client = Literal["inverse", "mnist", "sobel", "sort", "hash"]
+CLIENTS: tuple[str, ...] = get_args(Client)
 """In the order in which the paper's Fig. 6 shows them."""
 
 ANSWER_LIMIT_S = 10.0

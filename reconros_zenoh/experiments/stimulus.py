@@ -96,7 +96,8 @@ def read_inputs(inputs: Sequence[str], known: Mapping[str, str], types: TypeRegi
 def bag_topics(path: Path, known: Mapping[str, str], types: TypeRegistry) -> tuple[dict[str, str], float]:
     """Return the topics of a rosbag2 recording that are known, with their types, and its length [s].
 
-    Raise UsageError when it cannot be read, has none of them, or one with another type.
+    Topics without a message are left out. Raise UsageError when it cannot be read, has none of them, or one
+    with another type.
     """
     try:
         with Reader(path) as bag:
@@ -114,12 +115,12 @@ def bag_topics(path: Path, known: Mapping[str, str], types: TypeRegistry) -> tup
                 raise UsageError(
                     f"{path}: {connection.topic} was recorded with another definition of {expected.name}."
                 )
-    recorded = {connection.topic: connection.msgtype for connection in connections}
+    recorded = {each.topic: each.msgtype for each in connections if each.msgcount}
     found = {topic: name for topic, name in recorded.items() if topic in known}
     if not found:
         raise UsageError(
-            f"{path} has no topic that the project waits for. It has: {_listed(recorded)}; the project waits "
-            f"for: {_listed(known)}."
+            f"{path} has no message that the project waits for. It has: {_listed(recorded)}; the project "
+            f"waits for: {_listed(known)}."
         )
     return found, seconds
 

@@ -14,7 +14,7 @@ from reconros_zenoh.mapping.communication import TopicMapping, topics_of
 from reconros_zenoh.mapping.graph import Side
 from reconros_zenoh.mapping.project_graph import TopicEnd, gateway_topics, topic_ends
 from reconros_zenoh.project.ini import read_sections
-from reconros_zenoh.text_file import read_old_bytes
+from reconros_zenoh.text_file import read_old_bytes, replacing
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
@@ -170,16 +170,13 @@ def _line_end(line: str) -> str:
 
 
 def _replace(path: Path, text: str, encoding: str) -> None:
-    partial = path.with_name(f"{path.name}.partial")
     try:
-        partial.write_text(text, encoding=encoding, errors="surrogateescape", newline="")
-        shutil.copymode(path, partial)
-        partial.replace(path)
+        with replacing(path) as partial:
+            partial.write_text(text, encoding=encoding, errors="surrogateescape", newline="")
+            shutil.copymode(path, partial)
     except UnicodeEncodeError as error:
         raise UsageError(
             f"{path}: {error.object[error.start]!r} cannot be written in {encoding}. Save the file as UTF-8."
         ) from None
     except OSError as error:
         raise UsageError(f"{path} cannot be written ({error.strerror}). Check its permissions.") from None
-    finally:
-        partial.unlink(missing_ok=True)

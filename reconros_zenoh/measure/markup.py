@@ -8,6 +8,7 @@ from itertools import zip_longest
 from typing import TYPE_CHECKING
 
 from reconros_zenoh.errors import UsageError
+from reconros_zenoh.text_file import replacing
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -85,11 +86,10 @@ def write_page(path: Path, title: str, parts: Iterable[str]) -> None:
         + "\n".join([f"<h1>{escape(title)}</h1>", *parts])
         + "\n</body></html>\n"
     )
-    partial = path.with_name(path.name + ".partial")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        partial.write_text(page, encoding="utf-8")
-        partial.replace(path)
+        with replacing(path) as partial:
+            partial.write_text(page, encoding="utf-8")
     except OSError as error:
         raise UsageError(
             f"{path}: the report cannot be written: {error.strerror}. Choose a folder that you may write to."

@@ -213,7 +213,10 @@ def _mismatches(
             )
     for thread in threads:
         if thread.hardware is None and thread.software is None:
-            yield f"{path}:{thread.line}: {thread.name} has neither HwSource nor SwSource, so it cannot run."
+            yield (
+                f"{path}:{thread.line}: {thread.name} has neither HwSource nor SwSource, so it can run in "
+                "software only."
+            )
         if thread.hardware is not None and not thread.slots:
             yield f"{path}:{thread.line}: {thread.name} has a HwSource but no Slot to be built for."
 

@@ -103,12 +103,17 @@ def read_resource_groups(sections: Iterable[Section], warnings: list[str]) -> di
                     "Give each group a name of its own.",
                 )
             headings[group] = section
-            declarations = [
-                declaration
-                for option in section.options.values()
-                if (declaration := _declaration(group, number, option, warnings))
-            ]
-            declared[group] = {declaration.name: declaration for declaration in declarations}
+            declarations = declared[group] = {}
+            for option in section.options.values():
+                declaration = _declaration(group, number, option, warnings)
+                if declaration is None:
+                    continue
+                twin = declarations.setdefault(declaration.name, declaration)
+                if twin is not declaration:  # `a0` and `a%`
+                    raise option.error(
+                        f"{option.name} stands for {twin.name} in {group}, as line {twin.option.line} does.",
+                        "Rename one of them.",
+                    )
     return {
         group: tuple(_resource(declaration, declared, warnings) for declaration in declarations.values())
         for group, declarations in declared.items()

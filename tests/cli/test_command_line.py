@@ -149,6 +149,20 @@ def test_a_full_disk_is_told_in_a_line(words: str, tmp_path: Path) -> None:
     assert "Traceback" not in done.stderr
 
 
+def test_a_file_that_nobody_foresaw_is_told_as_other_errors_are(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A state folder below a file: what a command stumbles over is an object, too."""
+    file = tmp_path / "compose.yaml"
+    file.write_text("services: {}\n", encoding="utf-8")
+    monkeypatch.setenv("XDG_STATE_HOME", str(file))
+    done = reconros(f"down -f {file} --json")
+    told = json.loads(done.stdout)["error"]
+    assert (done.returncode, done.stderr) == (1, f"reconros: {told}\n")
+    assert told.startswith(f"{file}/reconros/")
+    assert told.endswith("/lock: Not a directory")
+
+
 def test_closed_streams_do_not_matter(tmp_path: Path) -> None:
     record = tmp_path / "times.csv"
     record.write_text("1.0\n2.0\n", encoding="utf-8")

@@ -207,16 +207,37 @@ def test_down_without_a_file_stops_the_one_that_is_running(
     }
 
 
-def test_a_record_of_another_version_is_named(services: Services, run: Run, tmp_path: Path) -> None:
+@pytest.mark.parametrize("options", [(), ("--json",)])
+def test_down_of_a_file_that_is_not_there_is_a_mistake(
+    run: Run, tmp_path: Path, options: tuple[str, ...]
+) -> None:
+    misspelt = tmp_path / "misspelt.yaml"
+    down = run("down", *options, file=misspelt)
+    assert (down.returncode, down.stdout) == (2, "")
+    assert down.stderr == f"{misspelt}: is not there, and nothing of it is running. Correct the name.\n"
+
+
+def test_down_stops_what_runs_of_a_file_that_is_gone(services: Services, run: Run) -> None:
+    _server_and(services, "block()")
+    assert run("up", "-d").returncode == 0
+    (services.folder / "compose.yaml").unlink()
+    assert run("down").returncode == 0
+    services.assert_gone()
+
+
+@pytest.mark.parametrize("content", ['{"pid": 1, "states": {}, "error": ""}', ""])
+def test_a_record_of_another_version_or_an_empty_one_is_named(
+    services: Services, run: Run, tmp_path: Path, content: str
+) -> None:
     _server_and(services, "block()")
     folder = StateFolder(services.folder / "compose.yaml", {"XDG_STATE_HOME": str(tmp_path / "state")})
     with folder.claimed():
         pass
     record = folder.path / "record.json"
-    record.write_text('{"pid": 1, "states": {}, "error": ""}')
+    record.write_text(content)
     down = run("down")
     assert (down.returncode, down.stdout) == (2, "")
-    assert f"{record}: was written by another version of reconros." in down.stderr
+    assert f"{record}: is not what this version of reconros writes." in down.stderr
 
 
 def test_down_stops_a_foreground_up_too(services: Services, start: Start, run: Run) -> None:
@@ -332,19 +353,19 @@ def test_a_full_disk_below_the_state_is_told(services: Services, run: Run, optio
     _server_and(services, "block()")
     state = StateFolder(services.folder / "compose.yaml", {"XDG_STATE_HOME": str(services.folder / "state")})
     state.make()
-    (state.path / "record.new").symlink_to("/dev/full")
+    (state.path / "record.json.partial").symlink_to("/dev/full")
     (state.path / "supervisor.log").symlink_to("/dev/full")
     up = run("up", *options)
     assert (up.returncode, up.stdout) == (2, "")
     assert up.stderr == (
-        f"{state.path / 'record.new'}: cannot be written (No space left on device). "
+        f"{state.path / 'record.json'}: cannot be written (No space left on device). "
         "Make room, or set XDG_STATE_HOME to another folder.\n"
     )
 
 
 def test_a_disk_that_gets_full_does_not_hide_what_failed(services: Services, run: Run) -> None:
     state = StateFolder(services.folder / "compose.yaml", {"XDG_STATE_HOME": str(services.folder / "state")})
-    program = f"pathlib.Path({str(state.path)!r}, 'record.new').symlink_to('/dev/full'); sys.exit(9)"
+    program = f"pathlib.Path({str(state.path)!r}, 'record.json.partial').symlink_to('/dev/full'); sys.exit(9)"
     services.compose_file(services.service("server", program))
     up = run("up")
     assert (up.returncode, up.stderr.splitlines()[0]) == (1, "Service server ended with status 9.")

@@ -72,7 +72,8 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     word = TypeRegistry().message("std_msgs/msg/UInt32")
     with Writer(tmp_path / "recording", version=9) as bag:
         angle = bag.add_connection("/angle", word.name, msgdef="uint32 data", rihs01=word.type_hash)
-        bag.write(angle, 0, b"".join(word.encode(word.cls(data=80))))
+        for at_ns in (0, 500_000_000):
+            bag.write(angle, at_ns, b"".join(word.encode(word.cls(data=80))))
     (tmp_path / "times.csv").write_text("2.5\n2.6\n41\n", encoding="utf-8")
     return tmp_path
 

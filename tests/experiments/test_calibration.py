@@ -29,7 +29,7 @@ from reconros_zenoh.experiments.calibration import (
 )
 from reconros_zenoh.experiments.measured import read_measurements
 from reconros_zenoh.experiments.parallel import Run, records_of
-from reconros_zenoh.experiments.profile_file import replacing, varied, with_values
+from reconros_zenoh.experiments.profile_file import new_profile, varied, with_values
 from reconros_zenoh.experiments.roundtrip import CLIENTS, application_folder
 from reconros_zenoh.measure.record import Record
 from reconros_zenoh.project.loader import load_project
@@ -276,14 +276,14 @@ def test_an_unwritable_out_is_refused_at_once_and_an_old_one_is_kept(tmp_path: P
     file = tmp_path / "file"
     file.write_text("old")
     for out in (tmp_path, file / "below.toml"):
-        with pytest.raises(UsageError, match=r"is a folder|cannot be written"), replacing(out):
+        with pytest.raises(UsageError, match=r"is a folder|cannot be written"), new_profile(out):
             pytest.fail("it must not begin")
 
     def stop(partial: Path) -> None:
         partial.write_text("half")
         raise KeyboardInterrupt
 
-    with pytest.raises(KeyboardInterrupt), replacing(file) as partial:
+    with pytest.raises(KeyboardInterrupt), new_profile(file) as partial:
         stop(partial)
     assert [path.name for path in tmp_path.iterdir()] == ["file"]
     assert file.read_text() == "old"

@@ -19,6 +19,7 @@ from reconros_zenoh.ros.type_registry import TypeRegistry
 from reconros_zenoh.ros.zero_message import message_of
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from pathlib import Path
 
 MAPPINGS = ["all_hardware", "all_software", "mixed"]
@@ -44,8 +45,10 @@ def round_trips(out: Path, *arguments: object) -> dict[str, Any]:
     return experiment
 
 
-def write_bag(path: Path, messages: list[tuple[str, str, int, dict[str, Any]]], digest: str = "") -> Path:
-    """Write a recording of messages: topic, type, time [ms] and fields."""
+def write_bag(
+    path: Path, messages: Sequence[tuple[str, str, int | None, dict[str, Any]]], digest: str = ""
+) -> Path:
+    """Write a recording of messages: topic, type, time [ms], None for a topic without any, and fields."""
     with Writer(path, version=9) as bag:
         connections: dict[str, Any] = {}
         for topic, name, at_ms, fields in messages:
@@ -54,8 +57,9 @@ def write_bag(path: Path, messages: list[tuple[str, str, int, dict[str, Any]]], 
                 connections[topic] = bag.add_connection(
                     topic, name, msgdef="uint32 data", rihs01=digest or kind.type_hash
                 )
-            payload = b"".join(kind.encode(message_of(kind, fields)))
-            bag.write(connections[topic], 10**18 + at_ms * 10**6, payload)
+            if at_ms is not None:
+                payload = b"".join(kind.encode(message_of(kind, fields)))
+                bag.write(connections[topic], 10**18 + at_ms * 10**6, payload)
     return path
 
 
@@ -142,6 +146,29 @@ def test_a_project_that_drives_itself_needs_no_input(tmp_path: Path) -> None:
     assert rows == [["/count", "hardware", "9.524"], ["/count", "software", "9.524"]]
 
 
+def test_what_a_publisher_pushes_out_is_lost(tmp_path: Path) -> None:
+    project = tmp_path / "blink"
+    new_project(project)
+    (project / "msg" / "blink_msgs" / "msg" / "Count.msg").write_text("uint8[1000000] count\n")
+    (project / "main.py").write_text(
+        "import numpy as np\n"
+        "from reconros_zenoh import Cycles\n"
+        "def main(app):\n"
+        "    pub = app.writer('count', 'pub')\n"
+        "    def software(message, context):\n"
+        "        context.publish(pub, pub.message(count=np.zeros(1_000_000, np.uint8)))\n"
+        "    app.register('count', 'timer', software=software, software_timing=Cycles(1000))\n"
+        "    app.spin()\n"
+    )
+    given = ("--profile", "miniitx-zynq7100", "--mapping", "software", "--seconds", 1.95)
+    faster = (project / "build.cfg").read_text().replace("rostmr, node, 100", "rostmr, node, 10")
+    (project / "build.cfg").write_text(faster)
+    told = json.loads(run(project, tmp_path / "out", "--json", *given))["mappings"]["software"]
+    calls = told["status"]["callbacks"]["count"]["calls"]
+    assert told["dropped"] > 100
+    assert told["outputs"]["/count"]["sent"] + told["dropped"] == pytest.approx(calls, abs=12)  # on their way
+
+
 def test_where_nothing_leaves_the_board_nothing_is_drawn(tmp_path: Path) -> None:
     (tmp_path / "compare.png").write_text("of an earlier run")
     shown = run(application_folder(), tmp_path, "--seconds", 0.1, "--mapping", "mixed")
@@ -175,9 +202,27 @@ def test_what_cannot_be_used_is_told(tmp_path: Path, arguments: list[str], says:
     assert says in str(caught.value)
 
 
+def test_a_recording_of_one_message_needs_seconds(tmp_path: Path) -> None:
+    bag = write_bag(tmp_path / "bag", [("/angle", WORD, 0, {"data": 80})])
+    with pytest.raises(UsageError, match=r"bag is over at once. Say with --seconds"):
+        round_trips(tmp_path / "out", "--bag", bag)
+    told = round_trips(tmp_path / "out", "--bag", bag, "--mapping", "mixed", "--seconds", 0.1)
+    assert told["mappings"]["mixed"]["outputs"]["/legangle"]["sent"] == 1
+
+
+def test_a_recorded_topic_without_messages_is_silent(tmp_path: Path) -> None:
+    empty = ("/image_raw", "sensor_msgs/msg/Image", None, {})
+    bag = write_bag(tmp_path / "empty", [empty])
+    with pytest.raises(UsageError, match=r"has no message that the project waits for. It has: none"):
+        round_trips(tmp_path / "out", "--bag", bag)
+    bag = write_bag(tmp_path / "heard", [empty, ("/angle", WORD, 0, {})])
+    told = round_trips(tmp_path / "out", "--bag", bag, "--mapping", "mixed", "--seconds", 0.01)
+    assert told["silent"] == ["/image_classification", "/image_raw"]
+
+
 def test_recordings_of_other_topics_or_types_are_refused(tmp_path: Path) -> None:
     other = write_bag(tmp_path / "other", [("/else", WORD, 0, {})])
-    with pytest.raises(UsageError, match=r"has no topic that the project waits for. It has: /else"):
+    with pytest.raises(UsageError, match=r"has no message that the project waits for. It has: /else"):
         round_trips(tmp_path / "out", "--bag", other)
     wrong = write_bag(tmp_path / "wrong", [("/angle", "std_msgs/msg/Int32", 0, {})])
     with pytest.raises(UsageError, match="was recorded as std_msgs/msg/Int32"):

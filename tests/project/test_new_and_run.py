@@ -159,6 +159,16 @@ def test_what_build_cfg_says_in_vain_is_warned_of_once(
     assert [f"the unknown option {name} is left out." in warning for warning in warnings] == [True]
 
 
+def test_a_callback_without_sources_runs_in_software_as_its_warning_says(
+    blink: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    replace(blink / "build.cfg", "HwSource = hls\nSwSource = c\n", "")
+    (blink / "mappings" / "hardware.toml").unlink()
+    (blink / "mappings" / "software.toml").unlink()
+    assert run(blink, "--seconds", 1)["callbacks"]["count"]["calls"] > 0
+    assert "count has neither HwSource nor SwSource, so it can run in software only." in caplog.text
+
+
 def test_a_mistake_that_follows_from_a_warning_comes_behind_it(
     blink: Path, caplog: pytest.LogCaptureFixture
 ) -> None:

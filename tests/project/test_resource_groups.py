@@ -77,6 +77,13 @@ def test_percent_outside_a_range_stays(tmp_path: Path) -> None:
     assert (node.name, node.ros_name) == ("node_%", "/n_%")
 
 
+def test_percent_makes_no_second_resource_of_a_name(tmp_path: Path) -> None:
+    text = '[General]\nName = x\n[ResourceGroup@g(0:1)]\nnode_1 = rosnode, "/n"\nnode_% = rosnode, "/m"\n'
+    with pytest.raises(FileError, match="node_% stands for node_1 in g_1, as line 4 does") as caught:
+        read(tmp_path, text)
+    assert caught.value.line == 5
+
+
 MISTAKES = {
     "too few arguments": ("x = rossub, node, msg", "do not fit rossub"),
     "too many arguments": ('x = rospub, node, msg, "/t", 5', "do not fit rospub"),
