@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import re
 from collections import defaultdict
 from contextlib import closing
 from queue import SimpleQueue
@@ -29,10 +30,17 @@ if TYPE_CHECKING:
 
 _log = logging.getLogger(__name__)
 
+_NAME = re.compile(r"[A-Za-z0-9_.-]+")  # one part of a key
 _HOST_ANEW = b"host anew"
 _ANSWER_NS = 2_000_000_000
 _LONGEST_ANSWER = 10_000_000
 _AGES = {"age_p50_ms": 50, "age_p95_ms": 95, "age_max_ms": 100}
+
+
+def check_board_name(name: str) -> None:
+    """Raise UsageError for what cannot name a board."""
+    if not _NAME.fullmatch(name):
+        raise UsageError(f"{name!r} cannot name a board. Use letters, digits, `-`, `_` and `.`.")
 
 
 def alive_key(board: str) -> str:
@@ -216,8 +224,10 @@ def ask(
 ) -> dict[str, Any]:
     """Return what the board answers on `reconros/<board>/<what>`.
 
-    Raise TransportError without an answer, and for one that is not of this form.
+    Raise TransportError without an answer, and for one that is not of this form, UsageError for what cannot
+    name a board.
     """
+    check_board_name(board)
     found = Event()
     replies: SimpleQueue[Reply | None] = SimpleQueue()
 

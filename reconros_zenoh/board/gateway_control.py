@@ -10,7 +10,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from reconros_zenoh.board.answers import VERSION, GatewayAnswer
 from reconros_zenoh.board.control import ask, gateways
 from reconros_zenoh.errors import UsageError
-from reconros_zenoh.ros.graph import EndpointToken, parse, tokens_expression
+from reconros_zenoh.ros.graph import EndpointKind, EndpointToken, parse, tokens_expression
 from reconros_zenoh.ros.names import resolve, type_name_of
 from reconros_zenoh.ros.qos import QosProfile
 
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 _LOOK_NS = 1_000_000_000
 _LONGEST_QUESTION = 10_000
+_OF_TOPICS = (EndpointKind.PUBLISHER, EndpointKind.SUBSCRIPTION)
 
 
 class _Wanted(BaseModel):
@@ -137,7 +138,7 @@ def check_type(transport: Transport, domain: int, topic: str, type_name: str) ->
     """Raise UsageError when the software-mapped topic is there with another type."""
     for key in transport.tokens(tokens_expression(domain), _LOOK_NS):
         token = parse(key)
-        if isinstance(token, EndpointToken) and token.name == topic:
+        if isinstance(token, EndpointToken) and token.kind in _OF_TOPICS and token.name == topic:
             found = type_name_of(token.dds_type)
             if found != type_name:
                 raise UsageError(

@@ -248,6 +248,8 @@ class _Results:
             key = (kernel, *(_identity(argument) for argument in arguments))
             hash(key)
         except TypeError:
+            key = None
+        if key is None:  # not above: what the kernel raises would name the TypeError as its context
             return computed(kernel, *arguments)
         with self._lock:
             if key in self._kept:

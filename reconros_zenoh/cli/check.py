@@ -46,9 +46,10 @@ def check(
     """
     if project.is_dir():
         files = read_project(project)
-        check_types(files.configuration, files.types())
-        for refused in files.unusable_mappings().values():
-            raise refused
+        with files.with_its_causes():
+            check_types(files.configuration, files.types())
+            for refused in files.unusable_mappings().values():
+                raise refused
         configuration = files.configuration
     else:
         configuration = check_topics(read_build_cfg(project))

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
-from reconros_zenoh.cli.options import ENDPOINT, AsJson, Domain, Router
+from reconros_zenoh.cli.options import ENDPOINT, AsJson, Router
 from reconros_zenoh.cli.printable import printable
 from reconros_zenoh.errors import UsageError
 from reconros_zenoh.transport.zenoh import ZenohTransport
@@ -58,7 +58,6 @@ def gateway(
         int | None, typer.Option("--qos-depth", help="How many messages a queue keeps.", show_default="10")
     ] = None,
     router: Router = ENDPOINT,
-    domain: Domain = 0,
     as_json: AsJson = False,
 ) -> None:
     """List the gateways of a board, or add one.
@@ -67,6 +66,7 @@ def gateway(
     is that of its ends on the software-mapped topic. Exit status 2 when no slot is free, or one of the topics
     has a gateway already or another type; a hardware-mapped topic that no callback has is a warning.
     """
+    from reconros_zenoh.board.control import ask_status
     from reconros_zenoh.board.gateway_control import ask_gateways, check_type
     from reconros_zenoh.project.type_names import inline_message_type
     from reconros_zenoh.ros.names import resolve
@@ -97,7 +97,7 @@ def gateway(
         raise UsageError("a gateway needs its hardware-mapped topic. Add --hmt TOPIC.")
     with ZenohTransport.open(router) as transport:
         if add is not None:
-            check_type(transport, domain, add["smt"], add["type"])
+            check_type(transport, ask_status(transport, board)["domain"], add["smt"], add["type"])
         answer = ask_gateways(transport, board, add)
     if as_json:
         print(json.dumps({"board": board, **answer}))

@@ -122,7 +122,8 @@ def _read(
     from reconros_zenoh.project.loader import read_project
 
     files = read_project(source)
-    project = _MappedProject(files, files.mapping(mapping))
+    with files.with_its_causes():
+        project = _MappedProject(files, files.mapping(mapping))
     types = files.types() if with_sizes else None  # to load them takes as long as all the rest
     return read_project_graph(files.configuration, project.mapping, types), project
 

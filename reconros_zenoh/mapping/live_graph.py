@@ -55,6 +55,12 @@ def live_graph(tokens: Iterable[str], hardware: Collection[str]) -> ComputationG
         for node in wanted
         if node not in in_network
     ]
+    sessions = {token.zid for token in announced if _full_name(token.namespace, token.node) in wanted}
+    if len(sessions) > 1:
+        notes.append(
+            f"The nodes in hardware run in {len(sessions)} processes, and a stream stays inside one board. "
+            "If they are not of one board, name those of one at a time."
+        )
     if silent:
         notes.append(f"Left out because nobody publishes on them at the moment: {', '.join(silent)}.")
     return ComputationGraph(

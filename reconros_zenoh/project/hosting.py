@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from reconros_zenoh.board.board import Board
+from reconros_zenoh.board.control import check_board_name
 from reconros_zenoh.clock.wall import WallEnvironment
-from reconros_zenoh.errors import UsageError
 from reconros_zenoh.project.application import Application
 from reconros_zenoh.rmw.node import Context
 
@@ -21,9 +20,6 @@ if TYPE_CHECKING:
     from reconros_zenoh.project.loader import Project
     from reconros_zenoh.project.mapping_file import ProjectMapping
     from reconros_zenoh.transport.base import Transport
-
-
-_NAME = re.compile(r"[A-Za-z0-9_.-]+")  # one part of a key
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,10 +37,7 @@ class BoardOptions:
     trace: Path | None = None
 
     def __post_init__(self) -> None:
-        if not _NAME.fullmatch(self.name):
-            raise UsageError(
-                f"{self.name!r} cannot name a board. Use letters, digits, `-`, `_` and `.` (--name)."
-            )
+        check_board_name(self.name)
 
 
 class HostedBoard:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -22,7 +23,7 @@ from reconros_zenoh.project.target import target_profile
 from reconros_zenoh.text_file import read_text_file
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
     from reconros_zenoh.board.executor import Executor
     from reconros_zenoh.board.profile import Profile
@@ -105,6 +106,20 @@ class ProjectFiles:
             )
         check_places(self.configuration, mapping.callbacks)
         return mapping
+
+    def log_warnings(self) -> None:
+        """Log the warnings of build.cfg: what was left out there shows as mistakes elsewhere."""
+        for warning in self.configuration.warnings:
+            _log.warning("%s", warning)
+
+    @contextmanager
+    def with_its_causes(self) -> Iterator[None]:
+        """Log the warnings if what is done within it is refused."""
+        try:
+            yield
+        except FileError:
+            self.log_warnings()
+            raise
 
     def mappings(self, names_or_files: Sequence[str | None]) -> dict[str, ProjectMapping]:
         """Return these mappings by name, each as `mapping` does; raise UsageError for two of one name."""
@@ -217,13 +232,9 @@ def read_project(folder: Path) -> ProjectFiles:
 
 
 def load_project(folder: Path) -> Project:
-    """Return the project in a folder; raise FileError for what is missing or wrong in it.
-
-    The warnings of its build.cfg are logged: what was left out there shows as mistakes elsewhere.
-    """
+    """Return the project in a folder and log its warnings; raise FileError for what is missing or wrong."""
     files = read_project(folder)
-    for warning in files.configuration.warnings:
-        _log.warning("%s", warning)
+    files.log_warnings()
     main = load_main(folder, files.configuration.name)
     return Project(folder, files.configuration, files.interfaces, main)
 

@@ -394,6 +394,12 @@ def test_a_board_of_another_version(monkeypatch: pytest.MonkeyPatch) -> None:
         ask(packed({"version": 2}), monkeypatch)
 
 
+@pytest.mark.parametrize("name", ["", "a/b", "*", "a b"])
+def test_what_cannot_name_a_board_is_not_asked(name: str) -> None:
+    with pytest.raises(UsageError, match="cannot name a board"):
+        ask_status(SimulatedNetwork(VirtualEnvironment()).transport("a1"), name)
+
+
 def test_nobody_answers_in_an_empty_network() -> None:
     """What `ask_status` builds on: a request without a server is over at once."""
     board, _ = board_that_ran()

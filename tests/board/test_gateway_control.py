@@ -181,3 +181,10 @@ def test_a_topic_that_is_there_with_another_type_is_refused() -> None:
     check_type(running.client.transport, 0, "/b", "std_msgs/msg/String")
     with pytest.raises(UsageError, match="/a has the type std_msgs/msg/UInt32, not std_msgs/msg/String"):
         check_type(running.client.transport, 0, "/a", "std_msgs/msg/String")
+
+
+def test_a_service_of_the_name_of_the_topic_is_none_of_its_ends() -> None:
+    running = Running()
+    node, flip = running.board.context.node("n"), types().service("std_srvs/srv/SetBool")
+    node.service(flip, "/a", lambda request: None)
+    check_type(running.client.transport, 0, "/a", "std_msgs/msg/UInt32")

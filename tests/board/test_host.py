@@ -334,6 +334,13 @@ def test_of_an_object_that_may_change_it_is_computed_each_time() -> None:
     assert host.compute(calls, counting) == 1
 
 
+def test_what_a_kernel_raises_has_no_context_of_ours() -> None:
+    host = Host(VirtualEnvironment(), threads=None)
+    with pytest.raises(ZeroDivisionError) as raised:
+        host.compute(lambda numbers: numbers[0] / 0, [1])
+    assert raised.value.__context__ is None
+
+
 def test_two_kernels_do_not_share_results() -> None:
     host = Host(VirtualEnvironment(), threads=None)
     assert host.compute(np.max, GRID) == 5

@@ -68,6 +68,12 @@ def test_without_a_node_in_hardware_it_says_how_to_name_them(network: SimulatedN
     assert any("--hardware" in note for note in graph.notes)
 
 
+def test_nodes_in_hardware_that_may_be_on_several_boards_are_noted(network: SimulatedNetwork) -> None:
+    note = "The nodes in hardware run in 2 processes, and a stream stays inside one board."
+    assert any(note in each for each in read(network, "/camera", "/robot/edge").notes)
+    assert not any("processes" in each for each in read(network, "/robot/edge", "/robot/lane").notes)
+
+
 def test_a_node_that_does_not_run(network: SimulatedNetwork) -> None:
     with pytest.raises(UsageError, match=r"no node /lane runs\. Name one of /camera, /robot/edge"):
         read(network, "lane")

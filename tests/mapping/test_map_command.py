@@ -203,6 +203,16 @@ def test_warnings_of_the_project_file_are_told(tmp_path: Path) -> None:
     assert any("unknown section [Unheard@of]" in warning for warning in run_json(tmp_path)["warnings"])
 
 
+def test_a_mistake_that_follows_from_a_warning_comes_behind_it(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    write(tmp_path, CAMERA.replace("HwSource", "HwSorce"))
+    write_mappings(tmp_path, hard=HARD)
+    with pytest.raises(FileError, match="which its thread is not built for"):
+        run(tmp_path)
+    assert "the unknown option HwSorce is left out." in caplog.text
+
+
 REFUSED: dict[str, tuple[tuple[object, ...], str]] = {
     "nothing": ((), "nothing to map"),
     "two sources": ((EXAMPLE, "--live"), "Give one of the two"),

@@ -160,6 +160,17 @@ def test_a_folder_is_read_with_the_mapping_that_run_would_take(tmp_path: Path) -
         run(folder)
 
 
+def test_a_mistake_that_follows_from_a_warning_comes_behind_it(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    path = tmp_path / "blink" / "build.cfg"
+    new_project(path.parent)
+    path.write_text(path.read_text(encoding="utf-8").replace("HwSource", "HwSorce"), encoding="utf-8")
+    with pytest.raises(FileError, match="which its thread is not built for"):
+        run(path.parent)
+    assert "the unknown option HwSorce is left out." in caplog.text
+
+
 def test_the_text_shows_everything(wild: Path, expected: Any) -> None:
     output = run(wild)
     for kind in ("clocks", "slots", "threads", "gateways"):

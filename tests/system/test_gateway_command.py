@@ -7,6 +7,10 @@ from typing import TYPE_CHECKING
 
 from processes import Process, run
 
+from reconros_zenoh.rmw.node import Context
+from reconros_zenoh.ros.type_registry import TypeRegistry
+from reconros_zenoh.transport.zenoh import ZenohTransport
+
 if TYPE_CHECKING:
     from conftest import Network
 
@@ -25,3 +29,21 @@ def test_a_stream_that_nobody_on_the_board_has_is_a_warning(network: Network) ->
         answer = json.loads(done.stdout)
         assert answer["warning"] == warning.format("/b")
         assert len(answer["gateways"]) == 2
+
+
+def test_the_type_of_a_topic_is_looked_up_in_the_domain_of_the_board(network: Network) -> None:
+    board = ("--router", network.endpoint, "--name", "fifth", "--domain", "5", "--profile", "native")
+    word = TypeRegistry().message("std_msgs/msg/UInt32")
+    with (
+        ZenohTransport.open(network.endpoint) as transport,
+        Process("board", *board, "--mapping", "all_software") as process,
+    ):
+        Context(transport, 5).node("n").publisher(word, "/here")
+        Context(transport, 0).node("n").publisher(word, "/elsewhere")
+        process.wait_for("board fifth serves roundtrip")
+        add = ("gateway", "fifth", "--router", network.endpoint, "--type", "std_msgs/String", "--hmt")
+        done = run(*add, "/here")
+        assert done.returncode == 2
+        assert "/here has the type std_msgs/msg/UInt32, not std_msgs/msg/String" in done.stderr
+        done = run(*add, "/elsewhere")
+        assert done.returncode == 0, done.stderr
