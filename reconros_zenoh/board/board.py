@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from reconros_zenoh.clock.virtual import VirtualEnvironment
     from reconros_zenoh.rmw.node import Context, Node
     from reconros_zenoh.ros.types import MessageType
+    from reconros_zenoh.transport.base import Publisher
 
 
 _ANY_CLOCK_HZ = 1e9
@@ -107,6 +108,7 @@ class Board:
         self.hardware_topics: dict[str, HardwareTopic] = {}
         self.gateways: list[Gateway] = []
         self._tap = tap
+        self._taps: list[Publisher] = []
         self.slots: Mapping[int, Slot] = {
             plan.slot_id: Slot(
                 environment,
@@ -145,7 +147,7 @@ class Board:
         if topic is None:
             topic = self.hardware_topics[name] = HardwareTopic(self, name, message_type)
             if self._tap:
-                topic.open_tap()
+                self._taps.append(topic.open_tap())
         if topic.type.name != message_type.name:
             raise UsageError(f"{topic.key} has the type {topic.type.name}, not {message_type.name}.")
         return topic
@@ -195,8 +197,8 @@ class Board:
 
     def close(self) -> None:
         """Let running computations end; the board does nothing any more."""
-        for gateway in self.gateways:
-            gateway.close()
+        for end in (*self.gateways, *self._taps):
+            end.close()
         if self.topics is not None:
             self.topics.close()
         self.zycap.deinit()

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from reconros_zenoh.clock.activity import Awaitable
     from reconros_zenoh.gateway.filters import PublisherFilter
     from reconros_zenoh.ros.types import MessageType
-    from reconros_zenoh.transport.base import Parts
+    from reconros_zenoh.transport.base import Parts, Publisher
 
 Policy = Literal["block", "drop"]
 FIFO_DEPTH = 2
@@ -170,8 +170,8 @@ class HardwareTopic:
         """Let every message that passes from now on reach this FIFO."""
         self._fifos.append(fifo)
 
-    def open_tap(self) -> None:
-        """Publish what passes on the topic's key; without any cost in the model."""
+    def open_tap(self) -> Publisher:
+        """Publish what passes on the topic's key, without any cost in the model, until this is closed."""
         publisher = self._board.context.transport.publish(self.key, QosProfile())
         host = self._board.sending_host
 
@@ -179,6 +179,7 @@ class HardwareTopic:
             yield from host.run(self, publisher.put, parts, None)
 
         self._tap = Stream(put, QosProfile().depth)
+        return publisher
 
     def publish(
         self,

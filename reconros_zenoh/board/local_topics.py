@@ -9,12 +9,12 @@ fitted to its speedups.
 from __future__ import annotations
 
 from collections import defaultdict, deque
-from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from reconros_zenoh.board.spans import Timeline
 from reconros_zenoh.board.stream import Stream
 from reconros_zenoh.board.writers import TopicWriter
+from reconros_zenoh.clock.activity import Signal
 from reconros_zenoh.rmw.received import Received
 from reconros_zenoh.ros.graph import EndpointKind, EndpointToken, parse, tokens_expression
 from reconros_zenoh.ros.message_arrays import snapshot
@@ -153,9 +153,13 @@ class LocalTopics:
 
 
 class _Sent(NamedTuple):
+    """A message for the readers of the board; `over` fires when it is published, or pushed out before."""
+
     message: Any
     parts: Parts
     timeline: Timeline
+    hardware: bool
+    over: Signal
 
 
 class LocalTopicWriter(TopicWriter):
@@ -183,7 +187,10 @@ class LocalTopicWriter(TopicWriter):
         self._in_place = in_place
         # The transport keeps what is sent for those who come late elsewhere.
         self._is_kept = qos.durability is Durability.TRANSIENT_LOCAL
-        self._publications: Stream[_Sent] = Stream(partial(self._publish, hardware=False), qos.queue_depth)
+        # Those of slots, too: a callback that runs here and there publishes in order.
+        self._publications: Stream[_Sent] = Stream(
+            self._publish, qos.queue_depth, lambda lost: lost.over.fire()
+        )
         self.kept: deque[_Publication] = deque(maxlen=qos.depth if self._is_kept else 0)
         topics.add_writer(self)
 
@@ -200,20 +207,23 @@ class LocalTopicWriter(TopicWriter):
     def send(self, encoded: Any, timeline: Timeline) -> None:
         """Publish for a software callback."""
         message, parts = encoded
-        self._publications.put(_Sent(message, parts, timeline))
+        self._publications.put(_Sent(message, parts, timeline, hardware=False, over=Signal()))
 
     def publish(self, message: object, timeline: Timeline) -> Generator[Awaitable, object, None]:
         """Return when the delegate has published; its call is part of what a publication costs."""
         message, parts = self.encode(message)
-        yield from self._publish(_Sent(message, parts, timeline.fork()), hardware=True)
+        sent = _Sent(message, parts, timeline.fork(), hardware=True, over=Signal())
+        self._publications.put(sent)
+        yield sent.over
         timeline.mark("dds")
 
-    def _publish(self, sent: _Sent, *, hardware: bool) -> Generator[Awaitable, object, None]:
+    def _publish(self, sent: _Sent) -> Generator[Awaitable, object, None]:
         received = Received(sent.message, sum(map(len, sent.parts)), 0, publisher=self.gid)
-        publication = _Publication(received, hardware, self._in_place)
+        publication = _Publication(received, sent.hardware, self._in_place)
         yield from self._topics.publish(self.key, publication, sent.timeline)
         self.kept.append(publication)
         if self._is_kept or self._topics.is_read_elsewhere(self.key):
             super().send(sent.parts, sent.timeline)
         else:
             self._board.spans.add(sent.timeline)
+        sent.over.fire()

@@ -103,10 +103,11 @@ class CallbackLists(ABC):
     def take(self, kind: CallbackKind, index: int, resource: int) -> Dispatch:
         """Take the oldest event of an entry and mark it running until `finish`."""
         entry = self._entries[kind][index]
-        # Before its event is taken: that makes room, and where nothing takes time the next one comes at once.
+        # Before its event is taken: that makes room, and where nothing takes time others go on at once, with
+        # its next event or one of theirs, and their workers look for more.
         entry.running = True
-        message = entry.source.take()
         self.refresh(entry)
+        message = entry.source.take()
         return Dispatch(entry, entry.mask.implementations[resource], message)
 
     def finish(self, dispatch: Dispatch) -> None:

@@ -1,6 +1,6 @@
 """The transport over Zenoh; this file and zenoh_session.py are the only ones that import zenoh.
 
-Callbacks run directly on Zenoh's network threads, all but one kind: a thread of its own for each declaration
+Callbacks run directly on Zenoh's network threads, all but two kinds: a thread of its own for each declaration
 costs a change of thread per message (20 us of a round trip of 290 us).
 """
 
@@ -29,6 +29,7 @@ from reconros_zenoh.transport.zenoh_session import (
     is_of_this_host,
     open_pool,
     open_session,
+    queued,
 )
 
 if TYPE_CHECKING:
@@ -132,20 +133,20 @@ class ZenohTransport(Closing):
                     except Exception:  # noqa: BLE001 # as in `call`
                         declaration.log_failure()
 
-        handler = direct(on_sample)
         if qos.durability is Durability.TRANSIENT_LOCAL:
             reliable = qos.reliability is Reliability.RELIABLE
             declaration.add(
                 ext.declare_advanced_subscriber,
                 self.session,
                 key,
-                handler,
+                # It is locked while its callback runs, which would wait for itself if it published to it.
+                queued(on_sample),
                 history=ext.HistoryConfig(detect_late_publishers=True, max_samples=qos.depth),
                 recovery=ext.RecoveryConfig(periodic_queries=None, heartbeat=True) if reliable else None,
                 subscriber_detection=True,
             )
         else:
-            declaration.add(self.session.declare_subscriber, key, handler)
+            declaration.add(self.session.declare_subscriber, key, direct(on_sample))
         return declaration
 
     def serve(self, key: str, sink: Callable[[Request], None], *, complete: bool = True) -> _Declaration:

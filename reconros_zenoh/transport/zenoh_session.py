@@ -12,6 +12,7 @@ from contextlib import suppress
 from functools import cache
 from ipaddress import ip_address
 from pathlib import Path
+from queue import SimpleQueue
 from shutil import disk_usage
 from typing import TYPE_CHECKING, TypeVar
 
@@ -138,6 +139,22 @@ def direct(callback: Callable[[_T], None], drop: Callable[[], None] | None = Non
         callback(argument)
 
     return Callback(call, drop, indirect=False)
+
+
+def queued(callback: Callable[[_T], None]) -> Callback[_T]:
+    """Return a handler that runs on a thread of its own and never keeps one of Zenoh's waiting.
+
+    An indirect `Callback` would: from the 257th argument that waits for it on.
+    """
+    waiting: SimpleQueue[tuple[_T] | None] = SimpleQueue()
+
+    def work() -> None:
+        while (argument := waiting.get()) is not None:
+            callback(*argument)
+            del argument  # it may lie in shared memory of its sender
+
+    threading.Thread(target=work, name="subscription", daemon=True).start()
+    return direct(lambda argument: waiting.put((argument,)), lambda: waiting.put(None))
 
 
 def open_pool(pool_bytes: int) -> Callable[[int], ZShmMut | None] | None:

@@ -152,8 +152,8 @@ def test_a_subscriber_does_not_hear_the_publisher_that_its_filter_names() -> Non
     assert stream.seen == [(300, "own")]
 
 
-def test_nothing_is_in_the_network_but_through_the_tap() -> None:
-    heard: list[tuple[str, bytes]] = []
+def test_nothing_is_in_the_network_but_through_the_tap_of_an_open_board() -> None:
+    heard: list[tuple[bool, str, bytes]] = []
     for tap in (False, True):
         quiet = small_board(small_profile())
         board = Board(quiet.environment, quiet.context, quiet.profile, (), name="b", tap=tap)
@@ -165,6 +165,9 @@ def test_nothing_is_in_the_network_but_through_the_tap() -> None:
         stream.fifo("a")
         body = message(20)
         stream.publish(body)
+        board.environment.run()
+        board.close()
+        stream.publish(message(30))
         board.environment.run()
     assert heard == [(True, "hmt/b/a", b"".join(words.encode(body)))]
 

@@ -106,6 +106,30 @@ def test_from_hardware_the_readers_share_the_memif_and_software_copies_at_its_sp
     }
 
 
+def test_what_is_published_in_software_and_in_hardware_comes_in_order() -> None:
+    setup = Setup(1)
+    bodies = [words.cls(layout=layout, data=np.array([number], np.uint8)) for number in range(4)]
+    timeline = Timeline(setup.environment, setup.environment.now)
+    for body in bodies[:3]:
+        setup.writer.send(setup.writer.encode(body), timeline.fork())
+    Activity(setup.writer.publish(bodies[3], timeline))
+    setup.environment.run()
+    for received in setup.got.values():
+        assert [message.data.tolist() for _, message in received] == [[0], [1], [2], [3]]
+
+
+def test_a_slot_whose_message_is_pushed_out_goes_on() -> None:
+    setup = Setup(1)
+    writer = setup.board.writer(setup.node, words, "/a", QosProfile(depth=1))
+    body = words.cls(layout=layout, data=np.zeros(U, np.uint8))
+    timelines = [Timeline(setup.environment, setup.environment.now) for _ in range(3)]
+    for timeline in timelines:
+        Activity(writer.publish(body, timeline))
+    setup.environment.run()
+    assert writer.dropped == 1
+    assert [timeline.stages_ns["dds"] for timeline in timelines] == [A + D, 0, 2 * (A + D)]
+
+
 @pytest.mark.parametrize("n", [1, 2, 4])
 def test_from_software_the_publisher_copies_and_readers_in_hardware_slow_the_one_in_software(n) -> None:
     setup = Setup(n)

@@ -290,6 +290,22 @@ def test_a_sink_may_close_its_own_subscription(network: Network) -> None:
     assert once.items == ["1"]
 
 
+@pytest.mark.parametrize("qos", [DEFAULT, LATCHED], ids=["volatile", "latched"])
+def test_a_sink_may_publish_what_it_hears_itself(network: Network, qos: QosProfile) -> None:
+    session, inbox = network.session(), network.inbox()
+    publisher = session.publish(KEY, qos)
+
+    def echo(sample: Sample) -> None:
+        if not sample.payload:
+            for _ in range(300):  # more than Zenoh lets wait for a thread
+                publisher.put([b"x"], None)
+        inbox.put_text(sample)
+
+    session.subscribe(KEY, echo, qos)
+    publisher.put([], None)
+    network.wait(lambda: sorted(inbox.items) == ["", *"x" * 300])
+
+
 def test_a_sink_that_raises_is_logged_once_and_goes_on(
     network: Network, caplog: pytest.LogCaptureFixture
 ) -> None:
