@@ -18,13 +18,12 @@ from reconros_zenoh.errors import CallbackError, UsageError
 from reconros_zenoh.executor.callbacks import CallbackKind
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable
 
     from small_board import Steps
 
     from reconros_zenoh.board.callback import HardwareThread
     from reconros_zenoh.board.software import SoftwareContext
-    from reconros_zenoh.clock.activity import Awaitable
 
 SUB = CallbackKind.SUB
 PROFILE = small_profile({"a": (100, 100), "b": (100, 100)}, cores=1)
@@ -67,19 +66,48 @@ def test_a_slot_that_waits_for_ever_is_freed(caplog: pytest.LogCaptureFixture) -
     assert str(record.exc_info[1]) == "callback a did not end within its limit of 0.005 ms."
 
 
-def test_endless_steps_are_stopped(caplog: pytest.LogCaptureFixture) -> None:
-    def endless(thread: HardwareThread) -> Steps:
-        while True:
-            yield from thread.compute_cycles(10)
+def endless(thread: HardwareThread) -> Steps:
+    while True:
+        yield from thread.compute_cycles(10)
 
+
+def stubborn(thread: HardwareThread) -> Steps:
+    while True:
+        try:
+            yield from thread.compute_cycles(10)
+        except Exception:  # noqa: BLE001 - what is tested
+            continue
+
+
+def satisfied(thread: HardwareThread) -> Steps:
+    try:
+        yield from thread.compute_cycles(10_000)
+    except Exception:  # noqa: BLE001 - what is tested
+        return "well"
+
+
+def departing(thread: HardwareThread) -> Steps:
+    try:
+        yield from thread.compute_cycles(10_000)
+    except Exception:  # noqa: BLE001 - what is tested
+        yield from thread.exit("well")
+
+
+@pytest.mark.parametrize(
+    ("callback", "busy_ns"), [(endless, 1000), (stubborn, 1010), (satisfied, 1000), (departing, 1000)]
+)
+def test_a_call_is_failed_at_its_limit_whatever_it_does_about_it(
+    callback: Callable[[HardwareThread], Steps], busy_ns: int
+) -> None:
     board = small_board(PROFILE, 1)
     executor, source = Executor(board, 0, 1), Tickets(board)
-    executor.add_hw_callback("a", [0], SUB, source, endless, timing=Cycles(0), limit_ms=0.001)
+    executor.add_hw_callback("a", [0], SUB, source, callback, timing=Cycles(0), limit_ms=0.001)
     executor.spin()
     source.put(1)
     board.environment.run(until=100_000)
     assert executor.failures == {"a": 1}
-    assert board.slots[0].busy.ns == 1000
+    assert not source.answers
+    assert board.slots[0].busy.ns == busy_ns
 
 
 def test_the_core_of_a_stopped_callback_is_free(caplog: pytest.LogCaptureFixture) -> None:
@@ -179,40 +207,3 @@ def test_a_limit_that_cannot_be(limit_ms: float) -> None:
     board = small_board(PROFILE)
     with pytest.raises(UsageError, match=r"limit_ms of callback 'a' is .*: write a time above 0"):
         Executor(board, 1, 0).add_sw_callback("a", SUB, Tickets(board), lambda _, __: 0, limit_ms=limit_ms)
-
-
-def test_steps_that_catch_everything_are_stopped() -> None:
-    def stubborn(thread: HardwareThread) -> Steps:
-        while True:
-            try:
-                yield from thread.compute_cycles(10)
-            except Exception:  # noqa: BLE001 - what is tested
-                continue
-
-    board = small_board(PROFILE, 1)
-    executor, source = Executor(board, 0, 1), Tickets(board)
-    executor.add_hw_callback("a", [0], SUB, source, stubborn, timing=Cycles(0), limit_ms=0.001)
-    executor.spin()
-    source.put(1)
-    board.environment.run(until=100_000)
-    assert executor.failures == {"a": 1}
-    assert board.slots[0].busy.ns == 1010
-
-
-@pytest.mark.parametrize("end", [lambda _: (), lambda thread: thread.exit()])
-def test_a_call_that_catches_the_error_of_its_limit_and_ends_is_failed(
-    end: Callable[[HardwareThread], Iterable[Awaitable]],
-) -> None:
-    def satisfied(thread: HardwareThread) -> Steps:
-        try:
-            yield from thread.compute_cycles(10_000)
-        except Exception:  # noqa: BLE001 - what is tested
-            yield from end(thread)
-
-    board = small_board(PROFILE, 1)
-    executor, source = Executor(board, 0, 1), Tickets(board)
-    executor.add_hw_callback("a", [0], SUB, source, satisfied, timing=Cycles(0), limit_ms=0.001)
-    executor.spin()
-    source.put(1)
-    board.environment.run(until=100_000)
-    assert executor.failures == {"a": 1}
