@@ -289,9 +289,8 @@ def _is_constant(argument: object) -> bool:
 def _identity(argument: object) -> object:
     """Return something equal for equal arguments: arrays by shape, type and a hash of their content.
 
-    Numbers of different types are different, as a kernel may overflow with one of them, and so are those of
-    different sign, as `atan2` tells both zeros apart. Raise TypeError for
-    what may change while it stays equal to itself.
+    Numbers of different types are different, as a kernel may overflow with one of them, and so are both
+    zeros, as `atan2` tells them apart. Raise TypeError for what may change while it stays equal to itself.
     """
     if isinstance(argument, np.ndarray):
         if _is_constant(argument):
