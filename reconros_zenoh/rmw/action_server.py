@@ -233,8 +233,7 @@ class ActionServer:
         return entry
 
     def _forget_old(self) -> None:
-        ended = [goal_id for goal_id in self._goals if goal_id in self._results]
-        for goal_id in ended[: max(0, len(ended) - _ENDED_KEPT)]:
+        for goal_id in list(self._results)[:-_ENDED_KEPT]:
             del self._goals[goal_id], self._entries[goal_id], self._results[goal_id]
 
 

@@ -246,6 +246,17 @@ def test_old_results_are_forgotten() -> None:
     assert len(case.server._goals) == len(case.server._entries) == len(case.server._results) == 100
 
 
+def test_a_goal_that_took_longer_than_a_hundred_others_keeps_its_result() -> None:
+    case = Case()
+    goal_id = case.send()
+    for _ in range(100):
+        case.send()
+        case.finish(case.goals[-1])
+    case.finish(case.goals[0], 1)
+    assert goal_id in case.server._results
+    assert case.statuses[-1].count(GoalStatus.SUCCEEDED) == 100
+
+
 @settings(max_examples=40)
 @given(
     st.lists(
