@@ -123,7 +123,10 @@ class ActionClient:
             else:
                 self._end(ActionEvent("result", goal_id, response.result, GoalStatus(response.status)))
 
-        self._get_result.call(request, on_response, _RESULT_NS)
+        try:
+            self._get_result.call(request, on_response, _RESULT_NS)
+        except TransportError:  # the session is being closed
+            self._end(ActionEvent("unanswered", goal_id))
 
     def _end(self, event: ActionEvent) -> None:
         self._mine.discard(event.goal_id)

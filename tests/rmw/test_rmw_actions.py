@@ -208,6 +208,18 @@ def test_without_a_server_nobody_answers() -> None:
     assert [event.kind for event in events] == ["unanswered"] * 2
 
 
+def test_a_goal_that_is_accepted_while_its_client_is_closed_ends(caplog: pytest.LogCaptureFixture) -> None:
+    case = Case()
+    goal_id = case.client.new_goal_id()
+    case.client.send_goal(FIBONACCI.goal.cls(order=3), goal_id)
+    (get_result,) = (end for end in case.client_node.endpoints if end.name.endswith("get_result"))
+    get_result.close()
+    case.sessions.settle()
+    assert case.kinds() == ["accepted", "unanswered"]
+    assert not case.client._mine
+    assert not caplog.records
+
+
 def test_feedback_on_the_goals_of_others_is_not_heard() -> None:
     case = Case()
     other: list[ActionEvent] = []
