@@ -40,7 +40,7 @@ def message_of(message_type: MessageType, fields: Mapping[str, Any]) -> Any:
             raise UsageError(f"{message_type.name} has no field {name!r}. Its fields: {known}.")
         try:
             setattr(message, name, _value(message_type, forms[name], value))
-        except (TypeError, ValueError, OverflowError) as error:
+        except (TypeError, ValueError, ArithmeticError) as error:
             raise UsageError(
                 f"field {name!r} of {message_type.name} cannot be {value!r}: {error}."
             ) from error
@@ -65,7 +65,8 @@ def _value(owner: MessageType, form: FieldDesc, value: Any) -> Any:
         kinds = _KINDS[number(form).kind]
         if not isinstance(value, kinds) or (isinstance(value, bool) and bool not in kinds):
             raise TypeError(f"it is a {number(form).name}")
-        return np.array(value, number(form)).item()
+        with np.errstate(over="raise"):
+            return np.array(value, number(form)).item()
     if not isinstance(value, str):
         raise TypeError("it is a string")
     return value

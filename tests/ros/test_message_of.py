@@ -43,6 +43,7 @@ def test_lists_become_arrays_of_the_fields_type_and_lists_of_messages() -> None:
         ("std_msgs/msg/Header", {"stamp": 5}, "cannot be 5: it is a message, given by its fields."),
         ("sensor_msgs/msg/LaserScan", {"ranges": 1}, "cannot be 1: it is a list."),
         ("sensor_msgs/msg/LaserScan", {"ranges": ["a"]}, "it is a float32."),
+        ("std_msgs/msg/Float32", {"data": 1e300}, "cannot be 1e+300: overflow"),
         ("sensor_msgs/msg/Imu", {"orientation_covariance": [1, 2]}, "it has 9 elements."),
         ("std_msgs/msg/Header", {"stamp": {"sec": "x"}}, "field 'sec' of builtin_interfaces/msg/Time"),
     ],
