@@ -104,7 +104,7 @@ def spans_figure(spans: Mapping[str, Mapping[str, Mapping[str, float]]]) -> Figu
     from matplotlib.figure import Figure  # noqa: PLC0415  see the module docstring
 
     clients = list(dict.fromkeys(client for row in spans.values() for client in row))
-    colours = _stage_colours(stage for row in spans.values() for cell in row.values() for stage in cell)
+    colours = stage_colours(stage for row in spans.values() for cell in row.values() for stage in cell)
     places = range(len(spans))
     with drawing_style():
         lines = -(-len(colours) // _LEGEND_COLUMNS)
@@ -355,7 +355,7 @@ def _legend(figure: Figure, ours: str, behind: str | None, colours: Sequence[str
     )
 
 
-def _stage_colours(stages: Iterable[str]) -> dict[str, str]:
+def stage_colours(stages: Iterable[str]) -> dict[str, str]:
     """Return a colour per stage, in the order of a message's way; stages of other names are grey and last."""
     found = dict.fromkeys(stages, GREY)
     return {stage: colour for stage, colour in STAGE_COLOURS.items() if stage in found} | {
