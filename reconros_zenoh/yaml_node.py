@@ -113,9 +113,9 @@ class YamlNode:
         """Return the values under their keys, in the order of the file."""
         if not isinstance(self.value, dict):
             raise self._wrong_type("a mapping (`key: value`)")
-        wrong = next((key for key in self.value if not isinstance(key, str)), None)
-        if wrong is not None:
-            raise self.error(f"has the key {wrong!r}, which is not a string.", "Put it in quotes.")
+        for key in self.value:
+            if not isinstance(key, str):
+                raise self.error(f"has the key {key!r}, which is not a string.", "Put it in quotes.")
         return {key: self._member(key, key) for key in self.value}
 
     def sequence(self) -> list[YamlNode]:

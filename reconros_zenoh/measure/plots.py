@@ -50,7 +50,8 @@ STAGE_COLOURS = {
 }
 _GRID_BINS = 60
 _GRID_PERCENTILES = (1.0, 50.0, 95.0)
-_FAR_APART = 5.0
+FAR_APART = 5.0
+"""Times of which one is more than so many times the other need a logarithmic axis."""
 _LEGEND_COLUMNS = 7
 
 
@@ -81,7 +82,7 @@ def grid_figure(records: Mapping[str, Mapping[str, Record]]) -> Figure:
                 axes.set_title(_medians(record, "board", board_ms), loc="right", fontsize=8)
         for row, mapping in enumerate(records):
             grid[row][0].set_ylabel(
-                _wrap(mapping, 18), fontsize=12, fontweight="bold", color=colours[row], labelpad=10
+                wrapped(mapping, 18), fontsize=12, fontweight="bold", color=colours[row], labelpad=10
             )
         figure.supxlabel("round-trip time [ms]; above each panel its median")
         figure.supylabel("relative frequency")
@@ -103,7 +104,7 @@ def spans_figure(spans: Mapping[str, Mapping[str, Mapping[str, float]]]) -> Figu
     from matplotlib.figure import Figure  # noqa: PLC0415  see the module docstring
 
     clients = list(dict.fromkeys(client for row in spans.values() for client in row))
-    colours = _stage_colours(stage for row in spans.values() for cell in row.values() for stage in cell)
+    colours = stage_colours(stage for row in spans.values() for cell in row.values() for stage in cell)
     places = range(len(spans))
     with drawing_style():
         lines = -(-len(colours) // _LEGEND_COLUMNS)
@@ -119,10 +120,10 @@ def spans_figure(spans: Mapping[str, Mapping[str, Mapping[str, float]]]) -> Figu
             for place, total in zip(places, left.tolist(), strict=True):
                 if total:
                     axes.annotate(f" {format_ms(total)}", (total, place), va="center", fontsize=8)
-            axes.set_title(_wrap(client, 18), loc="left", fontweight="bold")
+            axes.set_title(wrapped(client, 18), loc="left", fontweight="bold")
             axes.set_xlim(0, left.max() * 1.25 or 1.0)
             axes.locator_params(axis="x", nbins=4)
-            axes.set_yticks(places, [_wrap(mapping, 24) for mapping in spans])
+            axes.set_yticks(places, [wrapped(mapping, 24) for mapping in spans])
         grid[0].invert_yaxis()
         figure.supxlabel("mean time [ms]")
         handles, labels = grid[0].get_legend_handles_labels()
@@ -166,7 +167,7 @@ def write_histograms(path: Path, pairs: Sequence[tuple[NamedRecord, NamedRecord 
             behind = _shares(other.record, edges_ms) if other and other.record.values_ms.size else None
             _panel(axes, edges_ms, entry.record, behind, _MAPPING_COLOURS[1])
             # The empty line makes room for the medians.
-            axes.set_title(f"{_wrap(entry.name, 42)}\n", loc="left", fontweight="bold")
+            axes.set_title(f"{wrapped(entry.name, 42)}\n", loc="left", fontweight="bold")
             other_ms = float(np.median(other.record.values_ms)) if behind is not None and other else None
             axes.set_title(_medians(entry.record, "other", other_ms), loc="right", fontsize=8)
         for axes in grid[len(pairs) :]:
@@ -181,7 +182,7 @@ def write_histograms(path: Path, pairs: Sequence[tuple[NamedRecord, NamedRecord 
 def draw_histogram(axes: Axes, record: Record, edges_ms: npt.NDArray[np.float64], title: str) -> None:
     """Draw the record's histogram in the style around it, with its mean, and its median above it."""
     _panel(axes, edges_ms, record, None, _MAPPING_COLOURS[1])
-    axes.set_title(f"{_wrap(title, 42)}\n", loc="left", fontweight="bold")
+    axes.set_title(f"{wrapped(title, 42)}\n", loc="left", fontweight="bold")
     mean = format_ms(float(record.values_ms.mean()))
     axes.set_title(f"median {_medians(record, '', None)}, mean {mean} ms (dashed)", loc="right", fontsize=8)
 
@@ -318,7 +319,7 @@ def _grid_edges(records: Mapping[str, Mapping[str, Record]], client: str) -> npt
         return np.array([], dtype=np.float64)
     lows, medians, highs = np.array(points).T
     low, high = float(lows.min()), float(highs.max())
-    if low > 0 and medians.max() > _FAR_APART * medians.min():
+    if low > 0 and medians.max() > FAR_APART * medians.min():
         return np.geomspace(0.9 * low, 1.1 * high, _GRID_BINS + 1)
     margin = 0.04 * (high - low) or 0.5
     return np.linspace(0.0 if low < 0.3 * high else low - margin, high + margin, _GRID_BINS + 1)
@@ -329,7 +330,7 @@ def _medians(record: Record | None, other: str, other_ms: float | None) -> str:
     return ours if other_ms is None else f"{ours} ({other} {format_ms(other_ms)})"
 
 
-def _wrap(name: str, width: int) -> str:
+def wrapped(name: str, width: int) -> str:
     """Return the name in lines, broken after underscores where it can be."""
     return textwrap.fill(name.replace("_", "_ "), width).replace("_ ", "_")
 
@@ -354,7 +355,7 @@ def _legend(figure: Figure, ours: str, behind: str | None, colours: Sequence[str
     )
 
 
-def _stage_colours(stages: Iterable[str]) -> dict[str, str]:
+def stage_colours(stages: Iterable[str]) -> dict[str, str]:
     """Return a colour per stage, in the order of a message's way; stages of other names are grey and last."""
     found = dict.fromkeys(stages, GREY)
     return {stage: colour for stage, colour in STAGE_COLOURS.items() if stage in found} | {

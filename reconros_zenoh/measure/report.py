@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from reconros_zenoh.measure.compare import error_note, grade
 from reconros_zenoh.measure.findings import findings, host_troubles
 from reconros_zenoh.measure.markup import figure, table, write_page
-from reconros_zenoh.measure.plots import grid_figure, inline_svg, spans_figure
+from reconros_zenoh.measure.plots import grid_figure, inline_svg, spans_figure, stage_colours
 from reconros_zenoh.measure.reference.zynq7100 import (
     PRINTED_SPEEDUPS_OF_MEANS,
     SWAPPED_COLUMNS,
@@ -201,7 +201,7 @@ def _speedups(experiment: Mapping[str, Any]) -> str:
 
 def _stages(spans: Mapping[str, Mapping[str, Mapping[str, float]]]) -> str:
     cells = _by_client(spans)
-    stages = list(dict.fromkeys(stage for _, _, cell in cells for stage in cell))
+    stages = list(stage_colours(stage for _, _, cell in cells for stage in cell))
     rows: list[list[Cell]] = [
         [client, mapping, *(format_ms(cell.get(stage)) for stage in stages)]
         for mapping, client, cell in cells

@@ -44,7 +44,7 @@ def summarise(
 
 
 def format_ms(value: float | None) -> str:
-    """Return the time with three figures or more, `-` for None."""
+    """Return the time with two decimals, from 100 ms on with one; `-` for None."""
     if value is None:
         return "-"
     return f"{value:.{2 if value < 100 else 1}f}"

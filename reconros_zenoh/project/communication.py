@@ -11,6 +11,7 @@ from reconros_zenoh.errors import FileError, UsageError
 from reconros_zenoh.gateway.filters import Pair, conflict
 from reconros_zenoh.project.build_cfg import RosGateway
 from reconros_zenoh.project.gateway_slots import gateway_slots
+from reconros_zenoh.project.mapping_file import built_for
 from reconros_zenoh.ros.message_size import smallest_bytes
 from reconros_zenoh.ros.names import resolve
 
@@ -128,8 +129,9 @@ def check_fifos(configuration: BuildConfiguration, types: Callable[[], TypeRegis
 def check_places(configuration: BuildConfiguration, callbacks: Mapping[str, CallbackMapping]) -> None:
     """Raise FileError at the line of what cannot be where it would be.
 
-    That is a hardware-mapped end whose callback may run in software, a slot that is not reconfigurable and
-    would have to hold two callbacks, and a gateway without a slot of its own.
+    That is a callback that may run in software and has slots but no SwSource, a hardware-mapped end of one
+    that may run there, a slot that is not reconfigurable and would have to hold two callbacks, and a gateway
+    without a slot of its own.
     """
     for slot in configuration.slots:
         tenants = [name for name, callback in callbacks.items() if slot.id in callback.slots]
@@ -141,13 +143,19 @@ def check_places(configuration: BuildConfiguration, callbacks: Mapping[str, Call
                 "to it.",
                 "Map one callback to it, or write `Reconfigurable = true`.",
             )
+    built = built_for(configuration)
     for thread in configuration.threads:
+        if not callbacks[thread.name].software:
+            continue
+        if built[thread.name] and not thread.software:
+            raise FileError(
+                configuration.path,
+                thread.line,
+                f"The callback {thread.name} is mapped to software, but has no SwSource.",
+                "Map it to slots only, or name the source of its software version.",
+            )
         for resource in configuration.resources:
-            if (
-                resource.hardware_mapped
-                and resource.group in thread.resource_groups
-                and callbacks[thread.name].software
-            ):
+            if resource.hardware_mapped and resource.group in thread.resource_groups:
                 raise FileError(
                     configuration.path,
                     resource.line,

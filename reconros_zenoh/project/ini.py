@@ -41,8 +41,11 @@ class Option:
 
     def error(self, problem: str, remedy: str = "", offset: int = 0) -> FileError:
         """Return an error that names the line in which the character `offset` of the value stands."""
-        line = self.value_lines[self.value.count("\n", 0, offset)]
-        return FileError(self.path, line, problem, remedy)
+        return FileError(self.path, self.line_at(offset), problem, remedy)
+
+    def line_at(self, offset: int) -> int:
+        """Return the line in which the character `offset` of the value stands."""
+        return self.value_lines[self.value.count("\n", 0, offset)]
 
     def numbered_names(self, remedy: str) -> list[NumberedName]:
         """Return the names that the value lists, such as `slot(0:3)`; `FileError` if it is no such list."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -19,13 +19,17 @@ _RECTANGLE = re.compile(
 
 @dataclass(frozen=True)
 class Region:
-    """A rectangle of sites of one type; both corners belong to it, `x0 <= x1` and `y0 <= y1`."""
+    """A rectangle of sites of one type; both corners belong to it, `x0 <= x1` and `y0 <= y1`.
+
+    It stands in `line` of the project file.
+    """
 
     site: str
     x0: int
     y0: int
     x1: int
     y1: int
+    line: int = field(default=0, compare=False)
 
     def __str__(self) -> str:
         return f"{self.site}_X{self.x0}Y{self.y0}:{self.site}_X{self.x1}Y{self.y1}"
@@ -59,7 +63,8 @@ def read_regions(option: Option) -> tuple[Region, ...]:
                 position,
             )
         x0, y0 = int(match["x0"]), int(match["y0"])
-        region = Region(match["site"], x0, y0, int(match["x1"] or x0), int(match["y1"] or y0))
+        x1, y1 = int(match["x1"] or x0), int(match["y1"] or y0)
+        region = Region(match["site"], x0, y0, x1, y1, option.line_at(position))
         if region.x1 < region.x0 or region.y1 < region.y0:
             raise option.error(
                 f"The corners of {region} are swapped.", "Write the lower left corner first.", position

@@ -161,8 +161,8 @@ def _declaration(group: str, number: str | None, option: Option, warnings: list[
     if resource_type in _HARDWARE_MAPPED and args[3:4] == ("hw",):
         arguments = _HARDWARE_MAPPED[resource_type]
     required = sum(not argument.startswith("[") for argument in arguments)
-    kind_differs = resource_type in _INTERFACES and args[1:2] != arguments[1:2]
-    if not required <= len(args) <= len(arguments) or kind_differs:
+    no_interface = resource_type in _INTERFACES and (args[1:2] != arguments[1:2] or "/" in "".join(args))
+    if not required <= len(args) <= len(arguments) or no_interface:
         raise option.error(
             f"The arguments of {name} do not fit {resource_type}.",
             f"Write `{', '.join([f'{name} = {resource_type}', *arguments])}`.",

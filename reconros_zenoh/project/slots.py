@@ -64,8 +64,8 @@ def _overlap(section: Section, slot: HwSlot, others: Iterable[HwSlot]) -> Iterat
         for own, theirs in product(slot.regions, other.regions):
             if own.overlaps(theirs):
                 yield (
-                    f"{section.path}:{slot.line}: {own} of {slot.name} overlaps {theirs} of {other.name} in "
-                    f"line {other.line}. Give each site to one slot."
+                    f"{section.path}:{own.line}: {own} of {slot.name} overlaps {theirs} of {other.name} in "
+                    f"line {theirs.line}. Give each site to one slot."
                 )
                 return
 

@@ -51,6 +51,7 @@ MISTAKES = {
         1,
         "not a string. Put it in quot",
     ),
+    "a node with an empty name": ("nodes:\n  : hardware\ntopics: {}", 1, "nodes has the key None"),
     "a topic mapped twice": (
         NODES + "  A: {publishers: [n1]}\n  B: {publishers: [n1]}\n  A: {publishers: [n2]}\n",
         5,

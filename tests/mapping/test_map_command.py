@@ -139,7 +139,7 @@ def test_a_project_is_mapped_and_written_once(tmp_path: Path) -> None:
 
 
 def test_a_mapping_of_the_project(tmp_path: Path) -> None:
-    write(tmp_path)
+    write(tmp_path, CAMERA.replace("[ReconosThread@edge]", "[ReconosThread@edge]\nSwSource = c"))
     (tmp_path / "main.py").write_text("def main(app): ...")
     (tmp_path / "soft.toml").write_text(
         'executor = "standard"\nsoftware_workers = 1\n'

@@ -119,6 +119,13 @@ def test_stages_come_in_the_order_of_the_clients(tmp_path, board_records):
     assert re.findall(r'<tr><td class="text ">(\w+)', stages) == list(board_records["mixed"])
 
 
+def test_stages_stand_in_the_table_as_in_the_drawing(tmp_path, board_records):
+    spans = {"mixed": {"sort": {"mine": 1.0, "execution": 1.0}, "sobel": {"retransmission": 1.0, "dds": 1.0}}}
+    html = written(tmp_path / "r.html", (experiment_of(board_records, spans=spans), board_records))
+    (stages,) = re.findall(r"<details>(.*?)</details>", html, flags=re.DOTALL)
+    assert re.findall(r'<th class="number">(\w+)', stages) == ["dds", "retransmission", "execution", "mine"]
+
+
 def test_nothing_is_cut_on_paper(tmp_path, board_records):
     html = written(tmp_path / "r.html", (experiment_of(board_records), board_records))
     (on_paper,) = re.findall(r"@media print \{(.*)\}", html, flags=re.DOTALL)

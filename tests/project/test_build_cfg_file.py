@@ -255,12 +255,12 @@ def test_slots_that_share_sites_are_warned_of(tmp_path: Path) -> None:
         tmp_path,
         "[General]\nName = x\n[HwSlot@s(0:1)]\nId = 0\nRegion_0 = DSP48_X0Y0, SLICE_X0Y0:SLICE_X3Y9\n"
         "Region_1 = DSP48_X1Y0, SLICE_X4Y0:SLICE_X7Y9\n"
-        "[HwSlot@t(0:0)]\nId = 2\nRegion_0 = DSP48_X2Y0, SLICE_X3Y9:SLICE_X9Y12\n",
+        "[HwSlot@t(0:0)]\nId = 2\nRegion_0 = DSP48_X2Y0,\n  SLICE_X3Y9:SLICE_X9Y12\n",
     )
     [warning] = configuration.warnings
     assert warning == (
-        f"{configuration.path}:7: SLICE_X3Y9:SLICE_X9Y12 of t(0) overlaps SLICE_X0Y0:SLICE_X3Y9 of s(0) in "
-        "line 3. Give each site to one slot."
+        f"{configuration.path}:10: SLICE_X3Y9:SLICE_X9Y12 of t(0) overlaps SLICE_X0Y0:SLICE_X3Y9 of s(0) in "
+        "line 5. Give each site to one slot."
     )
 
 

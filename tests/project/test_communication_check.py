@@ -165,6 +165,18 @@ def test_a_callback_at_a_stream_may_only_be_mapped_to_slots(tmp_path) -> None:
     assert refused.value.line == 9
 
 
+def test_a_callback_that_has_slots_and_no_software_version_stays_out_of_software(tmp_path) -> None:
+    hardware_only = THREAD.replace("SwSource = c\n", "")
+    read = configuration(tmp_path, hardware_only)
+    check_places(read, {"t": CallbackMapping(slots=(0,))})
+    with pytest.raises(FileError, match="callback t is mapped to software, but has no SwSource") as refused:
+        check_places(read, {"t": CallbackMapping(software=True, slots=(0,))})
+    assert refused.value.line == 9
+    # One that could be nowhere else is only warned of.
+    read = configuration(tmp_path, hardware_only.replace("HwSource = hls\n", ""))
+    check_places(read, {"t": CallbackMapping(software=True)})
+
+
 @pytest.mark.parametrize(
     ("arguments", "fifo"),
     [

@@ -87,6 +87,8 @@ def test_percent_makes_no_second_resource_of_a_name(tmp_path: Path) -> None:
 MISTAKES = {
     "too few arguments": ("x = rossub, node, msg", "do not fit rossub"),
     "too many arguments": ('x = rospub, node, msg, "/t", 5', "do not fit rospub"),
+    "package with a slash": ("x = rosmsg, sensor/msgs, msg, Image", "do not fit rosmsg"),
+    "type with a slash": ("x = rossrvmsg, std_srvs, srv, std/Empty", "do not fit rossrvmsg"),
     "kind of another type": ("x = rosmsg, std_srvs, srv, Empty", "do not fit rosmsg"),
     "open quote": ('x = rospub, node, msg, "/t', "cannot be read"),
     "quote in a word": ('x = rosnode, a"b"', "cannot be read"),
