@@ -201,6 +201,5 @@ class Board:
             end.close()
         if self.topics is not None:
             self.topics.close()
-        self.zycap.deinit()
         self.host.close()
         self.sending_host.close()
