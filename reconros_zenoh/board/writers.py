@@ -6,7 +6,7 @@ from collections import deque
 from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
-from reconros_zenoh.board.stream import Stream
+from reconros_zenoh.board.serial_queue import SerialQueue
 from reconros_zenoh.ros.qos import QosProfile
 
 if TYPE_CHECKING:
@@ -60,12 +60,14 @@ class Writer:
         self._board = board
         self.sent = 0
         self.ages_ns: deque[int] = deque(maxlen=_AGES_KEPT)
-        self._stream: Stream[_Outgoing] = Stream(self._leave, qos.queue_depth, lambda lost: lost.on_dropped())
+        self._outgoing: SerialQueue[_Outgoing] = SerialQueue(
+            self._leave, qos.queue_depth, lambda lost: lost.on_dropped()
+        )
 
     @property
     def dropped(self) -> int:
         """How many messages were pushed out by newer ones."""
-        return self._stream.dropped
+        return self._outgoing.dropped
 
     def put(
         self,
@@ -78,7 +80,7 @@ class Writer:
 
         `on_dropped` is called instead, by the event loop, when it is pushed out or cannot be sent.
         """
-        self._stream.put(_Outgoing(send, sum(map(len, parts)), timeline, on_dropped))
+        self._outgoing.put(_Outgoing(send, sum(map(len, parts)), timeline, on_dropped))
 
     def _leave(self, outgoing: _Outgoing) -> Generator[Awaitable, object, None]:
         yield from self._board.dds.send(outgoing.size, outgoing.timeline)
