@@ -11,11 +11,11 @@ import pytest
 from octets import OCTETS, size_of, sized
 from small_board import TOPICS, desktop, small_board, small_profile, start, transferred_bytes, types
 
-from reconros_zenoh.board.control import gateways
 from reconros_zenoh.board.hmt import Fifo, FifoPlan
 from reconros_zenoh.board.profile import Profile, read_profile
 from reconros_zenoh.board.sources import SubscriptionSource
 from reconros_zenoh.board.spans import Timeline
+from reconros_zenoh.board.status import gateways
 from reconros_zenoh.clock.virtual import VirtualEnvironment
 from reconros_zenoh.errors import UsageError
 from reconros_zenoh.ros.graph import EndpointKind, EndpointToken, parse, tokens_expression

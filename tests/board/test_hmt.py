@@ -11,12 +11,12 @@ from octets import HEADER, OCTETS, octets, size_of, sized
 from small_board import Tickets, desktop, ignore, small_board, small_profile, start, transferred_bytes, types
 
 from reconros_zenoh.board.board import Board
-from reconros_zenoh.board.control import status
 from reconros_zenoh.board.executor import Executor
 from reconros_zenoh.board.hmt import Fifo, FifoPlan, HmtSource, HmtWriter
 from reconros_zenoh.board.kernel import Kernel
 from reconros_zenoh.board.profile import read_profile
 from reconros_zenoh.board.spans import Timeline
+from reconros_zenoh.board.status import status
 from reconros_zenoh.errors import BadMessageError, UsageError
 from reconros_zenoh.executor.callbacks import CallbackKind
 from reconros_zenoh.gateway.filters import PublisherFilter
