@@ -12,7 +12,7 @@ from kernels_for_tests import Counting, read_only
 from small_board import Tickets, small_board, small_profile, start
 
 from reconros_zenoh.board.executor import Executor
-from reconros_zenoh.board.host import Host, Limit, Overruns
+from reconros_zenoh.board.host import Host, Limit, Overruns, ThreadedHost
 from reconros_zenoh.clock.virtual import VirtualEnvironment
 from reconros_zenoh.clock.wall import WallEnvironment
 from reconros_zenoh.executor.callbacks import CallbackKind
@@ -32,12 +32,22 @@ CLOCKS = pytest.mark.parametrize("threads", [None, 1], ids=["virtual", "wall"])
 
 
 @contextmanager
-def host_with(threads: int | None) -> Iterator[tuple[VirtualEnvironment, Host]]:
-    environment = VirtualEnvironment() if threads is None else WallEnvironment()
-    host = Host(environment, threads)
+def threaded_host(threads: int = 2) -> Iterator[tuple[WallEnvironment, ThreadedHost]]:
+    environment = WallEnvironment()
+    host = ThreadedHost(environment, threads)
     host._expected_ns["short"] = 1
     yield environment, host
     host.close()
+
+
+@contextmanager
+def host_with(threads: int | None) -> Iterator[tuple[VirtualEnvironment, Host]]:
+    if threads is None:
+        environment = VirtualEnvironment()
+        yield environment, Host(environment)
+    else:
+        with threaded_host(threads) as (environment, host):
+            yield environment, host
 
 
 def late_after(environment: VirtualEnvironment, host: Host, modelled_ns: int, future: Any) -> Steps:
@@ -51,7 +61,7 @@ def run(environment: VirtualEnvironment, process: Steps) -> Any:
 
 def test_in_virtual_time_a_result_is_there_at_once_and_never_late() -> None:
     environment = VirtualEnvironment()
-    host = Host(environment, threads=None)
+    host = Host(environment)
     assert run(environment, host.result(host.start("task", max, 3, 5))) == 5
     assert run(environment, late_after(environment, host, 100, host.start("task", max, 3, 7))) == 7
     assert environment.now == 100
@@ -59,7 +69,7 @@ def test_in_virtual_time_a_result_is_there_at_once_and_never_late() -> None:
 
 
 def test_in_wall_time_a_result_that_is_there_in_time_is_no_overrun() -> None:
-    with host_with(2) as (environment, host):
+    with threaded_host() as (environment, host):
         future = host.start("task", max, 3, 5)
         future.result()
         assert run(environment, late_after(environment, host, 1, future)) == 5
@@ -67,7 +77,7 @@ def test_in_wall_time_a_result_that_is_there_in_time_is_no_overrun() -> None:
 
 
 def test_in_wall_time_a_result_later_than_modelled_is_an_overrun_of_the_time_it_was_late() -> None:
-    with host_with(2) as (environment, host):
+    with threaded_host() as (environment, host):
         may_end = threading.Event()
         future = host.start("task", may_end.wait, LIMIT_S)
         began_ns = environment.now
@@ -80,7 +90,7 @@ def test_in_wall_time_a_result_later_than_modelled_is_an_overrun_of_the_time_it_
 
 
 def test_every_overrun_counts() -> None:
-    with host_with(2) as (environment, host):
+    with threaded_host() as (environment, host):
         for number in (1, 2):
             may_end = threading.Event()
             environment.call_later(1 * MS, may_end.set)
@@ -89,7 +99,7 @@ def test_every_overrun_counts() -> None:
 
 
 def test_without_a_modelled_time_nothing_is_an_overrun() -> None:
-    with host_with(2) as (environment, host):
+    with threaded_host() as (environment, host):
         may_end = threading.Event()
         environment.call_later(1 * MS, may_end.set)
         assert run(environment, host.result(host.start("task", may_end.wait, LIMIT_S))) is True
@@ -103,7 +113,7 @@ def test_what_a_computation_raises_reaches_who_asks_for_its_result(threads: int 
 
 
 def test_a_computation_that_fails_late_is_an_overrun_too() -> None:
-    with host_with(2) as (environment, host):
+    with threaded_host() as (environment, host):
         may_end = threading.Event()
 
         def fail() -> None:
@@ -125,14 +135,14 @@ def test_the_hosts_of_a_closed_board_start_nothing_more() -> None:
 
 
 def test_two_computations_run_at_the_same_time_in_wall_time() -> None:
-    with host_with(2) as (environment, host):
+    with threaded_host() as (environment, host):
         both = threading.Barrier(2, timeout=LIMIT_S)
         futures = [host.start(number, both.wait) for number in (1, 2)]
         assert {run(environment, host.result(future)) for future in futures} == {0, 1}
 
 
 def test_in_wall_time_a_task_that_has_proved_short_runs_in_the_thread_of_the_event_loop() -> None:
-    with host_with(2) as (_, host):
+    with threaded_host() as (_, host):
         name = threading.current_thread
         assert host.start("task", name).result() is not threading.current_thread()
         host._expected_ns["task"] = 1000
@@ -148,21 +158,21 @@ def test_in_virtual_time_it_runs_in_line() -> None:
 
 @pytest.mark.parametrize(("expected_ns", "in_line"), [(1000, True), (99_999, True), (100_000, False)])
 def test_in_wall_time_what_is_over_soon_runs_in_line(expected_ns: int, in_line: bool) -> None:
-    with host_with(1) as (environment, host):
+    with threaded_host(1) as (environment, host):
         host._expected_ns["task"] = expected_ns
         thread = run(environment, host.run("task", threading.current_thread))
         assert (thread is threading.current_thread()) == in_line
 
 
 def test_what_may_wait_for_others_never_runs_in_line() -> None:
-    with host_with(1) as (environment, host):
+    with threaded_host(1) as (environment, host):
         for _ in range(2):
             thread = run(environment, host.run(None, threading.current_thread))
             assert thread is not threading.current_thread()
 
 
 def test_what_took_longer_in_line_is_expected_to() -> None:
-    with host_with(1) as (environment, host):
+    with threaded_host(1) as (environment, host):
         run(environment, host.run("short", threading.current_thread))
         assert host._expected_ns["short"] > 1
 
@@ -189,13 +199,13 @@ def test_with_a_limit_even_what_is_short_has_a_thread_of_its_own(threads: int | 
 def test_in_virtual_time_equal_inputs_are_computed_once_for_all_boards() -> None:
     kernel = Counting(np.sort)
     for _ in range(2):
-        host = Host(VirtualEnvironment(), threads=None)
+        host = Host(VirtualEnvironment())
         assert host.compute(kernel, np.array([3, 1, 2], np.uint32)).tolist() == [1, 2, 3]
     assert kernel.calls == 1
 
 
 def test_in_wall_time_what_may_change_is_computed_each_time() -> None:
-    with host_with(2) as (_, host):
+    with threaded_host() as (_, host):
         kernel = Counting(np.sort)
         for _ in range(3):
             result = host.compute(kernel, np.array([2, 1]))
@@ -205,7 +215,7 @@ def test_in_wall_time_what_may_change_is_computed_each_time() -> None:
 
 @pytest.mark.parametrize(("modelled", "calls"), [(True, 1), (False, 2)])
 def test_in_wall_time_a_model_computes_what_nobody_can_change_once(modelled: bool, calls: int) -> None:
-    host = Host(WallEnvironment(), threads=1, modelled=modelled)
+    host = ThreadedHost(WallEnvironment(), 1, modelled=modelled)
     kernel = Counting(np.sum)
     source = read_only([1, 2])
     assert [host.compute(kernel, source) for _ in range(2)] == [3, 3]
@@ -214,7 +224,7 @@ def test_in_wall_time_a_model_computes_what_nobody_can_change_once(modelled: boo
 
 
 def test_in_wall_time_what_a_message_brings_is_computed_each_time() -> None:
-    host = Host(WallEnvironment(), threads=1)
+    host = ThreadedHost(WallEnvironment(), 1)
     kernel = Counting(np.sum)
     received = np.frombuffer(bytes([1, 2]), np.uint8)
     assert [host.compute(kernel, received) for _ in range(2)] == [3, 3]
