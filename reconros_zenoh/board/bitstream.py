@@ -11,7 +11,7 @@ from reconros_zenoh.errors import BitstreamError, UsageError
 from reconros_zenoh.text_file import check_file
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Mapping
     from pathlib import Path
 
 # magic, slot, length of the callback's name, size of the whole file; then the CRC-32 of all but itself
@@ -74,11 +74,12 @@ class Bitstream:
         return cls(slot, content[_NAME_AT : _NAME_AT + name_length].decode(errors="replace"), size)
 
 
-def check_bitstreams(folder: Path, wanted: Iterable[Bitstream]) -> None:
-    """Raise BitstreamError unless the folder has all of these bitstreams.
+def read_bitstreams(folder: Path, wanted: Iterable[Bitstream]) -> Mapping[tuple[int, str], Bitstream]:
+    """Return the bitstreams that an executor needs from its folder, by slot and callback.
 
-    That is for one that is missing, damaged, or made for another slot, callback or size.
+    Raise BitstreamError for one that is missing, damaged, or made for another slot, callback or size.
     """
+    found: dict[tuple[int, str], Bitstream] = {}
     for bitstream in wanted:
         path = folder / bitstream.file_name
         content = Bitstream.read(path)
@@ -94,3 +95,5 @@ def check_bitstreams(folder: Path, wanted: Iterable[Bitstream]) -> None:
             raise BitstreamError(
                 path, None, f"has {content.size} bytes; this slot takes {bitstream.size}.", _REBUILD_ALIKE
             )
+        found[bitstream.slot, bitstream.callback] = content
+    return found

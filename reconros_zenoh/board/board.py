@@ -200,6 +200,7 @@ class Board:
             end.close()
         if self.topics is not None:
             self.topics.close()
+        self.zycap.deinit()
         self.host.close()
         self.sending_host.close()
 

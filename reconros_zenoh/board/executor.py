@@ -9,7 +9,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, Literal, SupportsIndex
 
 from reconros_zenoh.board.additions import check_addition
-from reconros_zenoh.board.bitstream import check_bitstreams
+from reconros_zenoh.board.bitstream import Bitstream, read_bitstreams
 from reconros_zenoh.board.callback import HardwareImplementation
 from reconros_zenoh.board.failures import Failures, text_of
 from reconros_zenoh.board.hmt import HmtSource
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from reconros_zenoh.board.callback import HardwareCallback
     from reconros_zenoh.board.software import SoftwareCallback
     from reconros_zenoh.board.sources import Event, Source
-    from reconros_zenoh.board.timing import Timing
+    from reconros_zenoh.board.timing import ExecutionTime, Timing
     from reconros_zenoh.board.workers import Worker
     from reconros_zenoh.executor.callbacks import Dispatch
 
@@ -45,12 +45,12 @@ class _Registration:
     source: Source
     check: Callable[[Any], None] | None
     software: SoftwareImplementation | None = None
-    slots: dict[int, HardwareImplementation] = field(default_factory=dict)
+    slots: dict[int, tuple[HardwareCallback, ExecutionTime, Limit | None]] = field(default_factory=dict)
 
     def timing(self) -> dict[str, object]:
         """Return what the time of the callback rests on in each place where it may run."""
         software = {} if self.software is None else {"software": describe(self.software.time)}
-        return software | {f"slot {slot}": describe(each.time) for slot, each in self.slots.items()}
+        return software | {f"slot {slot}": describe(time) for slot, (_, time, _) in self.slots.items()}
 
 
 class Executor:
@@ -158,32 +158,38 @@ class Executor:
         # The last that may refuse: what is refused leaves nothing behind.
         registration = self._register(name, kind, source, check)
         for slot, time in times.items():
-            bitstream = served[slot].admit(name)
-            registration.slots[slot] = HardwareImplementation(bitstream, thread, time, limit)
+            served[slot].admit(name)
+            registration.slots[slot] = (thread, time, limit)
 
     def spin(self) -> None:
-        """Open every source and start the workers.
+        """Load the bitstreams, open every source and start the workers.
 
         Deviation: it returns at once, because the event loop belongs to the board and may host several.
-        Raises UsageError the second time, BitstreamError for a bitstream that is not as it must be.
+        Raises UsageError the second time.
         """
         if self._is_spinning:
             raise UsageError("the executor spins already. Call spin() once, when all callbacks are added.")
         board = self.board
-        if self._bitstreams is not None:
-            check_bitstreams(
-                self._bitstreams,
-                (
-                    implementation.bitstream
-                    for registration in self._registrations.values()
-                    for slot, implementation in registration.slots.items()
-                    if board.slots[slot].reconfigurable
-                ),
-            )
+        wanted = {
+            (slot, name): Bitstream(slot, name, board.slots[slot].bitstream_size)
+            for name, registration in self._registrations.items()
+            for slot in registration.slots
+            if board.slots[slot].reconfigurable
+        }
+        board.zycap.init(read_bitstreams(self._bitstreams, wanted.values()) if self._bitstreams else wanted)
         self._is_spinning = True
         for name, registration in self._registrations.items():
-            mask = ResourceMask.of(software=registration.software, slots=registration.slots)
-            self._policy.add(CallbackEntry(name, registration.kind, mask, registration.source))
+            slots = {
+                slot: HardwareImplementation(self._bitstream(slot, name), *implementation)
+                for slot, implementation in registration.slots.items()
+            }
+            entry = CallbackEntry(
+                name,
+                registration.kind,
+                ResourceMask.of(software=registration.software, slots=slots),
+                registration.source,
+            )
+            self._policy.add(entry)
         model = board.profile.model
         software_poll_ns = model.executor.software_poll.ns if model and self.kind == "reconros" else 0
         hardware_poll_ns = model.executor.hardware_poll.ns if model else 0
@@ -288,6 +294,14 @@ class Executor:
         if (registration.kind, registration.check) != (kind, check):
             raise UsageError(f"callback {name!r} is registered already with another kind or check.")
         return registration
+
+    def _bitstream(self, slot_id: int, name: str) -> Bitstream:
+        """Return what is in the slot when the callback can run there."""
+        slot = self.board.slots[slot_id]
+        if slot.reconfigurable:
+            return self.board.zycap.bitstream(slot_id, name)
+        assert slot.holds is not None  # it admitted the callback
+        return slot.holds
 
     def _became_ready(self, entry: CallbackEntry) -> None:
         self._policy.refresh(entry)

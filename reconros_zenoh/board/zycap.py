@@ -6,8 +6,10 @@ from typing import TYPE_CHECKING
 
 import simpy
 
+from reconros_zenoh.errors import UsageError
+
 if TYPE_CHECKING:
-    from collections.abc import Generator
+    from collections.abc import Generator, Mapping
 
     from reconros_zenoh.board.bitstream import Bitstream
     from reconros_zenoh.board.cpu import Cpu
@@ -18,12 +20,11 @@ if TYPE_CHECKING:
 
 
 class ZyCAP:
-    """Writes bitstreams into slots.
+    """The three functions of the ReconROS library: `init`, `write_bitstream`, `deinit`.
 
     A write takes `t_rc = S / B + t_offset` and, where the profile says so, keeps the communication stack off
     the cores meanwhile and until it has recovered. There is one ICAP: writes queue for it. `icap` is None
-    where nothing is modelled. Deviation: no `init` and `deinit` as in the ReconROS library, because nothing
-    of a bitstream but its name and size has to be held in memory.
+    where nothing is modelled.
     """
 
     def __init__(
@@ -34,6 +35,22 @@ class ZyCAP:
         self._icap = icap
         self._recovery_ns = dds.recovery.ns if dds is not None and dds.stalled_by_reconfiguration else None
         self._port = simpy.Resource(environment, capacity=1)
+        self._prefetched: Mapping[tuple[int, str], Bitstream] = {}
+
+    def init(self, bitstreams: Mapping[tuple[int, str], Bitstream]) -> None:
+        """Hold these bitstreams in memory, so that a write need not read a file."""
+        self._prefetched = bitstreams
+
+    def deinit(self) -> None:
+        """Hold no bitstream any more."""
+        self._prefetched = {}
+
+    def bitstream(self, slot_id: int, callback: str) -> Bitstream:
+        """Return the prefetched bitstream; raise UsageError when there is none."""
+        try:
+            return self._prefetched[slot_id, callback]
+        except KeyError:
+            raise UsageError(f"there is no bitstream of callback {callback!r} for slot {slot_id}.") from None
 
     def reconfiguration_ns(self, size: int) -> int:
         """Return how long a write of `size` bytes takes [ns], without waiting for the port."""

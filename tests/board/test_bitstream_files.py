@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from reconros_zenoh.board.bitstream import Bitstream, check_bitstreams
+from reconros_zenoh.board.bitstream import Bitstream, read_bitstreams
 from reconros_zenoh.errors import BitstreamError, FileError, UsageError
 
 if TYPE_CHECKING:
@@ -80,16 +80,20 @@ def test_a_bitstream_too_small_for_its_header() -> None:
         Bitstream(0, "sobel", 10).write(Path("never"))
 
 
-def test_a_folder_that_has_all_that_is_wanted(tmp_path: Path) -> None:
+def test_an_executor_gets_what_it_wants(tmp_path: Path) -> None:
     wanted = [SOBEL, Bitstream(2, "sobel", 300), Bitstream(3, "hash", 200)]
     for bitstream in wanted:
         bitstream.write(tmp_path)
-    check_bitstreams(tmp_path, wanted)
+    assert read_bitstreams(tmp_path, wanted) == {
+        (3, "sobel"): wanted[0],
+        (2, "sobel"): wanted[1],
+        (3, "hash"): wanted[2],
+    }
 
 
 def test_a_file_that_is_missing(tmp_path: Path) -> None:
     path = tmp_path / SOBEL.file_name
-    assert "cannot be read (No such file" in refusal(lambda: check_bitstreams(tmp_path, [SOBEL]), path)
+    assert "cannot be read (No such file" in refusal(lambda: read_bitstreams(tmp_path, [SOBEL]), path)
 
 
 @given(st.integers(0, SOBEL.size - 1))
@@ -145,13 +149,13 @@ def test_a_name_that_is_no_text(tmp_path: Path) -> None:
     header = struct.pack("<8sQIQ", b"RRZBIT02", 3, 5, 200)
     body = b"\xff" * 5 + bytes(163)
     path.write_bytes(header + struct.pack("<I", zlib.crc32(body, zlib.crc32(header))) + body)
-    assert "holds callback" in refusal(lambda: check_bitstreams(tmp_path, [SOBEL]), path)
+    assert "holds callback" in refusal(lambda: read_bitstreams(tmp_path, [SOBEL]), path)
 
 
 def test_a_pipe_is_not_waited_for(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / SOBEL.file_name)
     with pytest.raises(FileError, match="it is a pipe"):
-        check_bitstreams(tmp_path, [SOBEL])
+        read_bitstreams(tmp_path, [SOBEL])
 
 
 @pytest.mark.parametrize(
@@ -165,4 +169,4 @@ def test_a_pipe_is_not_waited_for(tmp_path: Path) -> None:
 )
 def test_another_bitstream_renamed_into_its_place(tmp_path: Path, other: Bitstream, said: str) -> None:
     path = other.write(tmp_path / "elsewhere").rename(tmp_path / SOBEL.file_name)
-    assert refusal(lambda: check_bitstreams(tmp_path, [SOBEL]), path) == said
+    assert refusal(lambda: read_bitstreams(tmp_path, [SOBEL]), path) == said

@@ -225,6 +225,14 @@ def test_a_bitstream_for_a_slot_of_another_size(tmp_path: Path) -> None:
         Loaded(tmp_path).spin()
 
 
+def test_a_closed_board_holds_no_bitstream() -> None:
+    loaded = Loaded(None)
+    loaded.spin()
+    loaded.board.close()
+    with pytest.raises(UsageError, match="no bitstream"):
+        loaded.board.zycap.bitstream(0, "a")
+
+
 def test_seed_and_name_decide_which_messages_are_lost() -> None:
     def draws(name: str, seed: int) -> list[float]:
         like = small_board(PROFILE)

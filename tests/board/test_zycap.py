@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from small_board import BITSTREAM_BYTES, Log, small_board, small_profile, start
 
 from reconros_zenoh.board.bitstream import Bitstream
+from reconros_zenoh.errors import UsageError
 
 if TYPE_CHECKING:
     import simpy
@@ -175,3 +177,15 @@ def test_a_write_that_is_skipped_stalls_nothing() -> None:
     work_from(board, log, 0, "message", board.cpu.run_stack(60, share=1))
     board.environment.run()
     assert log == [(2000, "slot 0 holds sobel"), (2060, "message")]
+
+
+def test_prefetched_bitstreams_are_at_hand_until_deinit() -> None:
+    zycap = board_with_slots(1).zycap
+    sobel = Bitstream(0, "sobel", BITSTREAM_BYTES)
+    zycap.init({(0, "sobel"): sobel})
+    assert zycap.bitstream(0, "sobel") is sobel
+    with pytest.raises(UsageError, match="no bitstream of callback 'hash' for slot 0"):
+        zycap.bitstream(0, "hash")
+    zycap.deinit()
+    with pytest.raises(UsageError, match="no bitstream of callback 'sobel' for slot 0"):
+        zycap.bitstream(0, "sobel")
