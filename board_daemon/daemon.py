@@ -5,8 +5,9 @@ from __future__ import annotations
 from contextlib import nullcontext
 from typing import TYPE_CHECKING, Any
 
-from reconros_zenoh.board.control import ControlServer, claim_name, status
+from reconros_zenoh.board.control import ControlServer, claim_name
 from reconros_zenoh.board.gateway_control import GatewayServer
+from reconros_zenoh.board.status import status
 from reconros_zenoh.clock.process import begin_process, real_time_priority
 from reconros_zenoh.clock.virtual import succeed_once
 from reconros_zenoh.measure.trace_file import traced_to

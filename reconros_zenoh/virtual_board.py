@@ -12,10 +12,10 @@ import numpy as np
 from reconros_zenoh.board.actions import ActionClientSource, ActionSource
 from reconros_zenoh.board.board import Board, SlotPlan
 from reconros_zenoh.board.clients import ClientSource
-from reconros_zenoh.board.control import status
 from reconros_zenoh.board.executor import Executor
 from reconros_zenoh.board.profile import Profile, read_profile
 from reconros_zenoh.board.sources import ServiceSource, SubscriptionSource, TimerSource
+from reconros_zenoh.board.status import status
 from reconros_zenoh.clock.duration import duration_ns
 from reconros_zenoh.clock.virtual import VirtualEnvironment, succeed_once
 from reconros_zenoh.errors import UsageError

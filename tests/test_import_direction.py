@@ -277,13 +277,13 @@ def test_an_import_against_the_direction_is_named_with_its_file_and_line(
         ("board_daemon.daemon", "zenoh", True),
         ("board_daemon.daemon", "zenoh_extras", False),
         ("board_daemon.daemon", "reconros_zenoh.transport.zenoh", False),
-        ("reconros_zenoh.experiments.wall", "reconros_zenoh.transport.zenoh", False),
+        ("reconros_zenoh.experiments.roundtrip_wall", "reconros_zenoh.transport.zenoh", False),
         ("reconros_zenoh.transport.simulated", "reconros_zenoh.transport.zenoh", True),
         ("deploy.runner", "reconros_zenoh.transport.zenoh", True),
         ("reconros_zenoh.board.control", "reconros_zenoh.transport.base", False),
         ("reconros_zenoh.board.control", "reconros_zenoh.transport.zenoh", True),
         ("reconros_zenoh.rmw.node", "reconros_zenoh.transport.simulated", True),
-        ("reconros_zenoh.experiments.virtual", "reconros_zenoh.transport.simulated", False),
+        ("reconros_zenoh.experiments.roundtrip_virtual", "reconros_zenoh.transport.simulated", False),
     ],
 )
 def test_the_waist_is_the_base_of_the_transport(importer: str, imported: str, wrong: bool) -> None:

@@ -91,7 +91,7 @@ class _Host(_Part):
 
 
 class StatusAnswer(_Part):
-    """What `reconros/<board>/status` answers, see `board.control.status`."""
+    """What `reconros/<board>/status` answers, see `board.status`."""
 
     version: int
     board: _Text

@@ -11,7 +11,7 @@ from reconros_zenoh.board.cpu import Cpu
 from reconros_zenoh.board.dds import DdsStack
 from reconros_zenoh.board.gateway import Gateway
 from reconros_zenoh.board.hmt import HardwareTopic, hmt_key
-from reconros_zenoh.board.host import Host
+from reconros_zenoh.board.host import Host, ThreadedHost
 from reconros_zenoh.board.local_topics import LocalTopics, LocalTopicWriter
 from reconros_zenoh.board.log import BoardLog
 from reconros_zenoh.board.memif import Memif
@@ -98,10 +98,9 @@ class Board:
         self.dds = DdsStack(
             environment, self.cpu, model, self.randomness, self.trace.stack if self.trace else None
         )
-        # Without a model no event has a time that it could miss.
-        self.host = Host(environment, threads, modelled=model is not None)
+        self.host = self._new_host(threads)
         # In threads of its own: a message does not wait until a worker's computation has ended.
-        self.sending_host = Host(environment, threads, modelled=model is not None)
+        self.sending_host = self._new_host(threads)
         self.spans = Spans()
         self.topics = LocalTopics(self, model, model.topics) if model and model.topics else None
         self.writers: list[TopicWriter] = []
@@ -204,3 +203,9 @@ class Board:
         self.zycap.deinit()
         self.host.close()
         self.sending_host.close()
+
+    def _new_host(self, threads: int | None) -> Host:
+        if threads is None:
+            return Host(self.environment)
+        # Without a model no event has a time that it could miss.
+        return ThreadedHost(self.environment, threads, modelled=self.profile.model is not None)

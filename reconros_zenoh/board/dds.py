@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 from reconros_zenoh.board.busy_time import BusyTime
-from reconros_zenoh.board.stream import Stream
+from reconros_zenoh.board.serial_queue import SerialQueue
 from reconros_zenoh.clock.activity import Signal
 
 if TYPE_CHECKING:
@@ -65,7 +65,7 @@ class DdsStack:
         # time.
         self._transit_ns = {False: 0.0, True: 0.0}
         # Nothing is pushed out here: the queues of readers and writers are the ones that overflow.
-        self._passages: Stream[_Passage] = Stream(self._pass, None)
+        self._passages: SerialQueue[_Passage] = SerialQueue(self._pass, None)
         if model is not None:
             dds, link = model.dds, model.link
             self._latency_ns = link.latency.ns

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections import Counter, defaultdict
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -91,10 +90,6 @@ class Executor:
         self._is_spinning = False
         self._workers: list[Worker] = []
         self._workers_of: dict[str, list[Worker]] = {}
-        model = board.profile.model
-        self._poll_jitter = model.executor.poll_jitter.share if model else 0.0
-        self.dispatch_ns = model.executor.dispatch.ns if model else 0
-        """The core time [ns] of taking a message and starting its callback."""
         self.calls: Counter[str] = Counter()
         self.failures: Counter[str] = Counter()
         self._ways_to_fail: defaultdict[str, Failures] = defaultdict(Failures)
@@ -274,11 +269,6 @@ class Executor:
             }
             for name, registration in self._registrations.items()
         }
-
-    def until_poll_ns(self, poll_ns: int, idle_ns: int) -> int:
-        """Return how long [ns] until a worker that polls and has been idle for `idle_ns` looks next."""
-        drift_ns = poll_ns * self._poll_jitter * math.sqrt(idle_ns / poll_ns)
-        return round(-(idle_ns + self.board.randomness.gauss(0, drift_ns)) % poll_ns)
 
     def _check_addition(
         self, name: str, kind: object, source: object, function: object, timing: object

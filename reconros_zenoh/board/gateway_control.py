@@ -8,7 +8,8 @@ import msgpack
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from reconros_zenoh.board.answers import VERSION, GatewayAnswer
-from reconros_zenoh.board.control import ask, gateways
+from reconros_zenoh.board.control import ask
+from reconros_zenoh.board.status import gateways
 from reconros_zenoh.errors import UsageError
 from reconros_zenoh.ros.graph import EndpointKind, EndpointToken, parse, tokens_expression
 from reconros_zenoh.ros.names import resolve, type_name_of

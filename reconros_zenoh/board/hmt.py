@@ -10,8 +10,8 @@ from collections import deque
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
+from reconros_zenoh.board.serial_queue import SerialQueue
 from reconros_zenoh.board.sources import Event, Source
-from reconros_zenoh.board.stream import Stream
 from reconros_zenoh.clock.activity import Signal
 from reconros_zenoh.errors import BadMessageError, UsageError
 from reconros_zenoh.executor.callbacks import CallbackKind
@@ -154,9 +154,9 @@ class HardwareTopic:
         self._board = board
         self._overhead_ns = section.overhead.ns if section else 0
         self._ns_per_byte = 1 / section.bandwidth.bytes_per_ns if section else 0.0
-        self._passages: Stream[Streamed] = Stream(self._pass, None)
+        self._passages: SerialQueue[Streamed] = SerialQueue(self._pass, None)
         self._fifos: list[Fifo] = []
-        self._tap: Stream[Parts] | None = None
+        self._tap: SerialQueue[Parts] | None = None
         self.has_callback = False
         self.passed = 0
         self.waits = 0
@@ -178,7 +178,7 @@ class HardwareTopic:
         def put(parts: Parts) -> Generator[Awaitable, object, None]:
             yield from host.run(self, publisher.put, parts, None)
 
-        self._tap = Stream(put, QosProfile().depth)
+        self._tap = SerialQueue(put, QosProfile().depth)
         return publisher
 
     def publish(

@@ -4,17 +4,13 @@ from __future__ import annotations
 
 import threading
 import time
-from collections import OrderedDict
 from concurrent.futures import Future, wait
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Generic, TypeVar, cast
+from typing import TYPE_CHECKING, Generic, TypeVar, cast
 
-import numpy as np
-import xxhash
-
+from reconros_zenoh.board.kernel_results import KernelResults, computed, is_constant
 from reconros_zenoh.board.thread_pool import ThreadPool
 from reconros_zenoh.errors import CallbackLimitError
-from reconros_zenoh.ros.message_arrays import snapshot
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Hashable
@@ -26,10 +22,11 @@ R = TypeVar("R")
 R_co = TypeVar("R_co", covariant=True)
 _RESULTS_KEPT = 512
 _CONSTANTS_KEPT = 8
-_VALUES = (int, str, bytes, np.generic, type(None))
 _RUNS_REMEMBERED = 32
 _IN_LINE_NS = 100_000
 """About what it costs to hand a computation to another thread and its result back."""
+
+_of_all_boards = KernelResults(_RESULTS_KEPT)
 
 
 @dataclass(slots=True)
@@ -77,75 +74,59 @@ def _in_line(function: Callable[..., R], *arguments: object) -> _Done[R]:
         return _Done(None, error)
 
 
+def _in_own_thread(function: Callable[..., R], *arguments: object) -> Future[R]:
+    future: Future[R] = Future()
+
+    def run() -> None:
+        try:
+            future.set_result(function(*arguments))
+        except (Exception, SystemExit) as error:  # noqa: BLE001 - handed to whoever asks for the result
+            future.set_exception(error)
+
+    threading.Thread(target=run, name="limited computation", daemon=True).start()
+    return future
+
+
 class Host:
     """Runs the real computation while the model decides when its result is ready.
 
-    In wall time what takes long runs in a pool of threads, what is known to be over soon in line. In virtual
-    time everything runs in line, and a pure kernel computes equal inputs once for all boards of the process;
-    in wall time only an array that nobody can change is known to be equal: comparing takes time, too.
+    This one is for virtual time: everything runs in line, and a pure kernel computes equal inputs once for
+    all boards of the process.
     """
 
-    def __init__(
-        self, environment: VirtualEnvironment, threads: int | None, *, modelled: bool = True
-    ) -> None:
-        """`threads` is the size of the pool, None in virtual time.
-
-        Not `modelled`, every computation is real, and the event loop may be held up longer by one in line.
-        """
+    def __init__(self, environment: VirtualEnvironment) -> None:
         self._environment = environment
-        # What is expected to take less runs in line: it holds up the event loop that long.
-        self._in_line_ns = _IN_LINE_NS if modelled else 10 * _IN_LINE_NS
-        self._pool = None if threads is None else ThreadPool(threads, "computation")
-        self._expected_ns: dict[Hashable, float] = {}
-        self._of_constants = _Results(_CONSTANTS_KEPT) if modelled else None
         self.overruns = Overruns()
 
     def start(
-        self, task: Hashable, function: Callable[..., R], *arguments: object, limit: Limit | None = None
+        self,
+        task: Hashable,  # noqa: ARG002 - in line it may take any time
+        function: Callable[..., R],
+        *arguments: object,
+        limit: Limit | None = None,
     ) -> Future[R] | _Done[R]:
         """Start a computation and return its future; `task` names what tends to take equally long.
 
         It is remembered for ever, so it must not be a new one with each message. A task of None may take any
-        time, because it waits for others: it never holds up the event loop.
+        time, because it waits for others: it never holds up the event loop in wall time.
 
         With a limit it has a thread of its own, which nobody waits for longer: in virtual time the limit is
         one of this host's time as well, and its error stands in for the result.
         """
-        if limit is not None:
-            return self._start_limited(limit, function, *arguments)
-        if self._pool is None:
+        if limit is None:
             return _in_line(function, *arguments)
-        if task is None:
-            return self._pool.submit(function, *arguments)
-        if self._is_short(task):
-            return _in_line(self._timed, task, function, *arguments)
-        return self._pool.submit(self._timed, task, function, *arguments)
+        future = _in_own_thread(function, *arguments)
+        if not wait([future], limit.ns / 1e9).done:
+            return _Done(None, limit.error())
+        return future
 
     def run(
         self, task: Hashable, function: Callable[..., R], *arguments: object, limit: Limit | None = None
     ) -> Generator[Awaitable, object, R]:
         """Return what a computation returns once it is there; for the parameters see `start`."""
-        if limit is None and self._pool is None:
+        if limit is None:
             return function(*arguments)
-        if limit is None and self._is_short(task):
-            return self._timed(task, function, *arguments)
         return (yield from self.result(self.start(task, function, *arguments, limit=limit)))
-
-    def _start_limited(
-        self, limit: Limit, function: Callable[..., R], *arguments: object
-    ) -> Future[R] | _Done[R]:
-        future: Future[R] = Future()
-
-        def run() -> None:
-            try:
-                future.set_result(function(*arguments))
-            except (Exception, SystemExit) as error:  # noqa: BLE001 - handed to whoever asks for the result
-                future.set_exception(error)
-
-        threading.Thread(target=run, name="limited computation", daemon=True).start()
-        if self._pool is None and not wait([future], limit.ns / 1e9).done:
-            return _Done(None, limit.error())
-        return future
 
     def result(self, future: Future[R] | _Done[R]) -> Generator[Awaitable, object, R]:
         """Return the result of a started computation once it is there; raises what it raised."""
@@ -180,11 +161,7 @@ class Host:
 
         Arrays that it returns are read-only: others may get the same ones.
         """
-        if self._pool is None:
-            return _results.of(kernel, *arguments)
-        if self._of_constants is not None and all(map(_is_constant, arguments)):
-            return self._of_constants.of(kernel, *arguments)
-        return computed(kernel, *arguments)
+        return _of_all_boards.of(kernel, *arguments)
 
     def forget_overruns(self) -> None:
         """Count overruns from here on."""
@@ -192,8 +169,55 @@ class Host:
 
     def close(self) -> None:
         """Start no other computation, and wait for a while for those that run."""
-        if self._pool is not None:
-            self._pool.close()
+
+
+class ThreadedHost(Host):
+    """The host in wall time: what is known to be over soon runs in line, all else in a pool of threads.
+
+    Of inputs only arrays that nobody can change are known to be equal: comparing takes time, too.
+    """
+
+    def __init__(self, environment: VirtualEnvironment, threads: int, *, modelled: bool = True) -> None:
+        """`threads` is the size of the pool.
+
+        Not `modelled`, every computation is real, and the event loop may be held up longer by one in line.
+        """
+        super().__init__(environment)
+        # What is expected to take less runs in line: it holds up the event loop that long.
+        self._in_line_ns = _IN_LINE_NS if modelled else 10 * _IN_LINE_NS
+        self._pool = ThreadPool(threads, "computation")
+        self._expected_ns: dict[Hashable, float] = {}
+        self._of_constants = KernelResults(_CONSTANTS_KEPT) if modelled else None
+
+    def start(
+        self, task: Hashable, function: Callable[..., R], *arguments: object, limit: Limit | None = None
+    ) -> Future[R] | _Done[R]:
+        """Start a computation and return its future, see `Host.start`."""
+        if limit is not None:
+            return _in_own_thread(function, *arguments)
+        if task is None:
+            return self._pool.submit(function, *arguments)
+        if self._is_short(task):
+            return _in_line(self._timed, task, function, *arguments)
+        return self._pool.submit(self._timed, task, function, *arguments)
+
+    def run(
+        self, task: Hashable, function: Callable[..., R], *arguments: object, limit: Limit | None = None
+    ) -> Generator[Awaitable, object, R]:
+        """Return what a computation returns once it is there; for the parameters see `start`."""
+        if limit is None and self._is_short(task):
+            return self._timed(task, function, *arguments)
+        return (yield from self.result(self.start(task, function, *arguments, limit=limit)))
+
+    def compute(self, kernel: Callable[..., R], *arguments: object) -> R:
+        """Return `kernel(*arguments)` of a pure kernel, see `Host.compute`."""
+        if self._of_constants is not None and all(map(is_constant, arguments)):
+            return self._of_constants.of(kernel, *arguments)
+        return computed(kernel, *arguments)
+
+    def close(self) -> None:
+        """Start no other computation, and wait for a while for those that run."""
+        self._pool.close()
 
     def _is_short(self, task: Hashable) -> bool:
         """Tell whether a computation of this kind is over before a thread of the pool would begin with it."""
@@ -215,90 +239,3 @@ def measured(function: Callable[..., R], *arguments: object) -> tuple[R, int]:
     """Return `function(*arguments)` and how long it took here [ns]."""
     started_ns = time.perf_counter_ns()
     return function(*arguments), time.perf_counter_ns() - started_ns
-
-
-def computed(kernel: Callable[..., R], *arguments: object) -> R:
-    """Return `kernel(*arguments)`, computed now; its arrays are read-only."""
-    return _frozen(kernel(*arguments), arguments)
-
-
-def _frozen(result: R, arguments: tuple[object, ...]) -> R:
-    """Return a result whose arrays nobody can change; one that the kernel has made need not be copied."""
-    if type(result) is tuple:
-        elements = cast("tuple[object, ...]", result)
-        return cast("R", tuple(_frozen(element, arguments) for element in elements))
-    if not isinstance(result, np.ndarray):
-        return result
-    if result.base is None and all(result is not argument for argument in arguments):
-        result.flags.writeable = False
-    return cast("R", snapshot(result))
-
-
-class _Results:
-    """The results of pure kernels that were asked for last."""
-
-    def __init__(self, most: int) -> None:
-        self._most = most
-        self._kept: OrderedDict[object, object] = OrderedDict()
-        self._lock = threading.Lock()
-
-    def of(self, kernel: Callable[..., R], *arguments: object) -> R:
-        """Return `kernel(*arguments)`, computed unless it is known; of what may change it never is."""
-        try:
-            key = (kernel, *(_identity(argument) for argument in arguments))
-            hash(key)
-        except TypeError:
-            key = None
-        if key is None:  # not above: what the kernel raises would name the TypeError as its context
-            return computed(kernel, *arguments)
-        with self._lock:
-            if key in self._kept:
-                self._kept.move_to_end(key)
-                return self._kept[key]  # type: ignore[return-value] # stored below under the same kernel
-        result = computed(kernel, *arguments)
-        with self._lock:
-            self._kept[key] = result
-            if len(self._kept) > self._most:
-                self._kept.popitem(last=False)
-        return result
-
-
-_results = _Results(_RESULTS_KEPT)
-
-
-class _Unchanging:
-    """An array that owns its content and cannot be written: it is equal to itself, whatever it holds."""
-
-    __slots__ = ("_array",)
-
-    def __init__(self, array: np.ndarray[Any, Any]) -> None:
-        self._array = array
-
-    def __hash__(self) -> int:
-        return id(self._array)
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Unchanging) and other._array is self._array
-
-
-def _is_constant(argument: object) -> bool:
-    """Whether the argument is an array that nobody can change."""
-    return isinstance(argument, np.ndarray) and argument.base is None and not argument.flags.writeable
-
-
-def _identity(argument: object) -> object:
-    """Return something equal for equal arguments: arrays by shape, type and a hash of their content.
-
-    Numbers of different types are different, as a kernel may overflow with one of them, and so are both
-    zeros, as `atan2` tells them apart. Raise TypeError for what may change while it stays equal to itself.
-    """
-    if isinstance(argument, np.ndarray):
-        if _is_constant(argument):
-            return _Unchanging(argument)
-        content = np.ascontiguousarray(argument)
-        return argument.shape, argument.dtype, xxhash.xxh3_128_digest(content.data)
-    if isinstance(argument, float | complex | np.inexact):  # by its bytes: -0.0 is equal to 0.0
-        return type(argument), np.array(argument).tobytes()
-    if not isinstance(argument, _VALUES):
-        raise TypeError(f"{type(argument).__name__} may change")
-    return type(argument), argument

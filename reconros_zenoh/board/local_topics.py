@@ -11,8 +11,8 @@ from __future__ import annotations
 from collections import defaultdict, deque
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from reconros_zenoh.board.serial_queue import SerialQueue
 from reconros_zenoh.board.spans import Timeline
-from reconros_zenoh.board.stream import Stream
 from reconros_zenoh.board.writers import TopicWriter
 from reconros_zenoh.clock.activity import Signal
 from reconros_zenoh.rmw.received import Received
@@ -188,7 +188,7 @@ class LocalTopicWriter(TopicWriter):
         # The transport keeps what is sent for those who come late elsewhere.
         self._is_kept = qos.durability is Durability.TRANSIENT_LOCAL
         # Those of slots, too: a callback that runs here and there publishes in order.
-        self._publications: Stream[_Sent] = Stream(
+        self._publications: SerialQueue[_Sent] = SerialQueue(
             self._publish, qos.queue_depth, lambda lost: lost.over.fire()
         )
         self.kept: deque[_Publication] = deque(maxlen=qos.depth if self._is_kept else 0)

@@ -6,8 +6,8 @@ from collections import deque
 from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
+from reconros_zenoh.board.serial_queue import SerialQueue
 from reconros_zenoh.board.spans import Timeline
-from reconros_zenoh.board.stream import Stream
 from reconros_zenoh.board.writers import Writer
 from reconros_zenoh.errors import BadMessageError, UsageError
 from reconros_zenoh.executor.callbacks import CallbackKind
@@ -137,12 +137,14 @@ class Reader(Source):
         self._board = board
         self.message_type = message_type
         self._reliable = qos.reliability is Reliability.RELIABLE
-        self._stream: Stream[tuple[Received, Timeline, _Way]] = Stream(self._receive, qos.queue_depth)
+        self._incoming: SerialQueue[tuple[Received, Timeline, _Way]] = SerialQueue(
+            self._receive, qos.queue_depth
+        )
 
     @property
     def dropped(self) -> int:
         """How many messages were pushed out by newer ones or lost."""
-        return super().dropped + self._stream.dropped
+        return super().dropped + self._incoming.dropped
 
     def arrive(self, received: Received) -> None:
         """Accept a message from the transport; callable from any thread."""
@@ -152,7 +154,7 @@ class Reader(Source):
         environment = self._board.environment
         timeline = Timeline(environment, environment.now - received.transit_ns)
         way = self._board.dds.receive(received.size, received.transit_ns, timeline, reliable=self._reliable)
-        self._stream.put((received, timeline, way))
+        self._incoming.put((received, timeline, way))
 
     def _receive(self, incoming: tuple[Received, Timeline, _Way]) -> Generator[Awaitable, object, None]:
         received, timeline, way = incoming
@@ -223,7 +225,7 @@ class SubscriptionSource(Reader):
         except BadMessageError as error:
             self._board.context.rejections.add(self._topic, received.publisher, error)
             return
-        self._stream.put((received, timeline, way))
+        self._incoming.put((received, timeline, way))
 
 
 class ServiceSource(Reader):

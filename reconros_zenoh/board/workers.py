@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from types import GeneratorType
 from typing import TYPE_CHECKING
@@ -16,6 +17,7 @@ from reconros_zenoh.executor.callbacks import CallbackKind
 from reconros_zenoh.executor.resource_mask import SOFTWARE
 
 if TYPE_CHECKING:
+    import random
     from collections.abc import Generator
 
     from reconros_zenoh.board.callback import HardwareCallback, HardwareImplementation
@@ -34,9 +36,8 @@ class Worker(ABC):
     """One thread: takes a ready callback, runs it to completion, and looks again.
 
     A worker that finds nothing looks again once per poll period; it is woken when something became ready and
-    goes on at the next point of that grid (`poll_ns` 0: at once). Each period is as long as it happens to be:
-    the point after k of them is off by sqrt(k) times the deviation of one. `serves` is the timeline of the
-    event whose callback it runs, since `since_ns`, or None.
+    goes on at the next point of that grid (`poll_ns` 0: at once), see `until_poll_ns`. `serves` is the
+    timeline of the event whose callback it runs, since `since_ns`, or None.
     """
 
     def __init__(self, executor: Executor, resource: int, poll_ns: int, track: Track | None) -> None:
@@ -46,6 +47,9 @@ class Worker(ABC):
         self._environment = executor.board.environment
         self.resource = resource
         self._poll_ns = poll_ns
+        model = executor.board.profile.model
+        self._poll_jitter = model.executor.poll_jitter.share if model else 0.0
+        self._dispatch_ns = model.executor.dispatch.ns if model else 0
         self.serves: Timeline | None = None
         self.since_ns = 0
         # Traced or not is known from the start: who is not traced pays nothing for it.
@@ -74,7 +78,7 @@ class Worker(ABC):
             yield PARK
             if self._poll_ns:
                 idle_ns = self._environment.now - idle_since_ns
-                delay_ns = self._executor.until_poll_ns(self._poll_ns, idle_ns)
+                delay_ns = until_poll_ns(self._poll_ns, idle_ns, self._poll_jitter, self._board.randomness)
                 if delay_ns:
                     yield self._environment.timeout(delay_ns)
             dispatch = self._executor.select(self)
@@ -117,7 +121,7 @@ class SoftwareWorker(Worker):
 
     def _execute(self, dispatch: Dispatch, event: Event) -> Generator[Awaitable, object, object]:
         board, timeline = self._board, event.timeline
-        yield from board.cpu.run(self._executor.dispatch_ns)
+        yield from board.cpu.run(self._dispatch_ns)
         timeline.mark("dispatch")
         implementation: SoftwareImplementation = dispatch.implementation  # type: ignore[assignment]
         context = SoftwareContext(board, dispatch.entry.name, implementation.time, event.sequence_number)
@@ -166,7 +170,7 @@ class HardwareWorker(Worker):
 
     def _execute(self, dispatch: Dispatch, event: Event) -> Generator[Awaitable, object, object]:
         board, timeline = self._board, event.timeline
-        yield from board.cpu.run(self._executor.dispatch_ns)
+        yield from board.cpu.run(self._dispatch_ns)
         timeline.mark("dispatch")
         implementation: HardwareImplementation = dispatch.implementation  # type: ignore[assignment]
         yield from board.zycap.write_bitstream(self._slot, implementation.bitstream)
@@ -193,6 +197,16 @@ class HardwareWorker(Worker):
         finally:
             thread.close()
             self._slot.busy.end()
+
+
+def until_poll_ns(poll_ns: int, idle_ns: int, jitter: float, randomness: random.Random) -> int:
+    """Return how long [ns] until a worker that polls and has been idle for `idle_ns` looks next.
+
+    Each period is as long as it happens to be: the point after k of them is off by sqrt(k) times the
+    deviation of one, which is `jitter` of it.
+    """
+    drift_ns = poll_ns * jitter * math.sqrt(idle_ns / poll_ns)
+    return round(-(idle_ns + randomness.gauss(0, drift_ns)) % poll_ns)
 
 
 def _steps(callback: HardwareCallback, thread: HardwareThread) -> Generator[Awaitable, object, object]:

@@ -6,11 +6,11 @@ from collections import deque
 from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
-from reconros_zenoh.board.stream import Stream
+from reconros_zenoh.board.serial_queue import SerialQueue
 from reconros_zenoh.ros.qos import QosProfile
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Generator, Sequence
+    from collections.abc import Callable, Generator
 
     from reconros_zenoh.board.board import Board
     from reconros_zenoh.board.spans import Timeline
@@ -50,7 +50,7 @@ class _Outgoing(NamedTuple):
 
 
 class Writer:
-    """Takes messages through the stack and over the link in order, then sends them.
+    """Takes messages through the stack and over the link in order, then sends them: base of publishers.
 
     With KEEP_LAST at most `depth` wait; a further one pushes the oldest out. `sent` counts what has left,
     `ages_ns` says of the last how old it was then: since the message or timer that it follows from.
@@ -60,12 +60,14 @@ class Writer:
         self._board = board
         self.sent = 0
         self.ages_ns: deque[int] = deque(maxlen=_AGES_KEPT)
-        self._stream: Stream[_Outgoing] = Stream(self._send, qos.queue_depth, lambda lost: lost.on_dropped())
+        self._outgoing: SerialQueue[_Outgoing] = SerialQueue(
+            self._leave, qos.queue_depth, lambda lost: lost.on_dropped()
+        )
 
     @property
     def dropped(self) -> int:
         """How many messages were pushed out by newer ones."""
-        return self._stream.dropped
+        return self._outgoing.dropped
 
     def put(
         self,
@@ -78,9 +80,9 @@ class Writer:
 
         `on_dropped` is called instead, by the event loop, when it is pushed out or cannot be sent.
         """
-        self._stream.put(_Outgoing(send, sum(map(len, parts)), timeline, on_dropped))
+        self._outgoing.put(_Outgoing(send, sum(map(len, parts)), timeline, on_dropped))
 
-    def _send(self, outgoing: _Outgoing) -> Generator[Awaitable, object, None]:
+    def _leave(self, outgoing: _Outgoing) -> Generator[Awaitable, object, None]:
         yield from self._board.dds.send(outgoing.size, outgoing.timeline)
         # A large message is copied into the transport: not by the thread that keeps the clock.
         yield from self._board.sending_host.run(self, outgoing.send)
@@ -89,7 +91,7 @@ class Writer:
         self.ages_ns.append(outgoing.timeline.age_ns)
 
 
-class TopicWriter:
+class TopicWriter(Writer):
     """A publisher of the board."""
 
     in_slot = False
@@ -98,27 +100,11 @@ class TopicWriter:
         self, board: Board, node: Node, message_type: MessageType, topic: str, qos: QosProfile | None = None
     ) -> None:
         qos = QosProfile.or_default(qos)
-        self._board = board
-        self._writer = Writer(board, qos)
+        super().__init__(board, qos)
         self._publisher = node.publisher(message_type, topic, qos)
         self.topic = self._publisher.name
         self.key = self._publisher.key
         self.gid = self._publisher.gid
-
-    @property
-    def dropped(self) -> int:
-        """How many messages were pushed out by newer ones."""
-        return self._writer.dropped
-
-    @property
-    def sent(self) -> int:
-        """How many messages have left the board."""
-        return self._writer.sent
-
-    @property
-    def ages_ns(self) -> Sequence[int]:
-        """How old the last of them were when they left, since the message or timer they follow from."""
-        return self._writer.ages_ns
 
     def message(self, **fields: object) -> Any:
         """Return a message of the topic's type with these fields."""
@@ -130,7 +116,7 @@ class TopicWriter:
 
     def send(self, encoded: Parts, timeline: Timeline) -> None:
         """Publish an encoded message."""
-        self._writer.put(encoded, timeline, partial(self._publisher.publish_encoded, encoded))
+        self.put(encoded, timeline, partial(self._publisher.publish_encoded, encoded))
 
     def publish(self, message: object, timeline: Timeline) -> Generator[Awaitable, object, None]:
         """Publish the message through the delegate: ROS_PUBLISHER_PUBLISH."""

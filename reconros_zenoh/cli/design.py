@@ -78,7 +78,7 @@ def design(
                 run_design_virtual(plan, endings, advance)
             else:
                 from reconros_zenoh.experiments.design_wall import run_design_wall
-                from reconros_zenoh.experiments.wall import free_port
+                from reconros_zenoh.experiments.endpoints import free_port
 
                 port = free_port() if view else None
                 if view:

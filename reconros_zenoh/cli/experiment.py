@@ -126,11 +126,11 @@ def run(plan: Plan, *, quiet: bool) -> dict[str, Any]:
         prepare(plan)
         with ExperimentProgress(plan, quiet=quiet) as progress, until_interrupted() as interruption:
             if plan.clock == "virtual":
-                from reconros_zenoh.experiments.virtual import run_virtual
+                from reconros_zenoh.experiments.roundtrip_virtual import run_virtual
 
                 run_virtual(plan, report, progress.advance)
             else:
-                from reconros_zenoh.experiments.wall import run_wall
+                from reconros_zenoh.experiments.roundtrip_wall import run_wall
 
                 run_wall(plan, report, progress.advance)
         return finish(plan, report, interrupted=interruption.happened)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from reconros_zenoh.board.control import status
+from reconros_zenoh.board.status import status
 from reconros_zenoh.cli.console import interrupted, wide_console
 from reconros_zenoh.cli.options import (
     ENDPOINT,

@@ -21,7 +21,7 @@ SHARED_PARTS = {"cores": "cores", "icap": "ICAP", "memif": "MEMIF", "stack": "DD
 
 
 def print_status(console: Console, status: Mapping[str, Any]) -> None:
-    """Print what `board.control.status` returned as tables."""
+    """Print what `board.status` returned as tables."""
     console.print(
         f"board {status['board']}: profile {status['profile']}, {status['executor']} executor, "
         f"domain {status['domain']}",

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 from host_clients.closed_loop import ClosedLoop
 from host_clients.suite import exchange
-from reconros_zenoh.board.host import Host, computed
+from reconros_zenoh.board.host import ThreadedHost
+from reconros_zenoh.board.kernel_results import computed
 from reconros_zenoh.board.osif import Osif
 from reconros_zenoh.clock.virtual import VirtualEnvironment
 from reconros_zenoh.clock.wall import WallEnvironment
@@ -237,7 +238,7 @@ class _Watch:
         self.kernel_ms.clear()
 
 
-class _WatchedHost(Host):
+class _WatchedHost(ThreadedHost):
     """Notes when computations start and when their results are used, and how long the kernels take."""
 
     def __init__(self, watch: _Watch, environment: VirtualEnvironment, threads: int) -> None:

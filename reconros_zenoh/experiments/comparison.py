@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from reconros_zenoh.board.control import status
+from reconros_zenoh.board.status import status
 from reconros_zenoh.experiments.simulation import Simulation
 from reconros_zenoh.experiments.stimulus import feed
 from reconros_zenoh.mapping.project_graph import OUTSIDE, read_project_graph, topic_ends

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from reconros_zenoh.board.control import status
+from reconros_zenoh.board.status import status
 from reconros_zenoh.errors import UsageError
 from reconros_zenoh.experiments.simulation import Simulation
 from reconros_zenoh.measure.record import Record, RecordWriter

@@ -62,7 +62,7 @@ class Ending:
     """What there was when a variant ended or was interrupted."""
 
     status: Mapping[str, Any]
-    """What the board `vision` said of itself (`board.control.status`)."""
+    """What the board `vision` said of itself (`board.status`)."""
 
     pictures: int | None
     """How many pictures the camera had taken; None where nobody counted them."""

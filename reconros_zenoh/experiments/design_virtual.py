@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 from host_clients.camera import CameraOptions
 from host_clients.gallery import Gallery
-from reconros_zenoh.board.control import status
 from reconros_zenoh.board.profile import read_profile
+from reconros_zenoh.board.status import status
 from reconros_zenoh.experiments.design import RATE_HZ, VARIANTS, Ending, projects_folder
 from reconros_zenoh.experiments.simulation import Simulation
 from reconros_zenoh.measure.record import RecordWriter

@@ -12,7 +12,7 @@ from deploy.runner import LocalRunner
 from deploy.service_run import ServiceState
 from reconros_zenoh.board.control import ask_status
 from reconros_zenoh.experiments.design import RATE_HZ, VARIANTS, Ending, projects_folder
-from reconros_zenoh.experiments.wall import free_port
+from reconros_zenoh.experiments.endpoints import free_endpoint
 from reconros_zenoh.transport.zenoh import ZenohTransport
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ def run_design_wall(
     """
     with as_file(files("deploy") / "design_example.yaml") as compose:
         for variant in VARIANTS:
-            router = f"tcp/127.0.0.1:{free_port()}"
+            router = free_endpoint()
             folder = plan.variant_folder(variant).resolve()
             environment = {
                 **os.environ,

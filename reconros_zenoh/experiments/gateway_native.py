@@ -16,12 +16,12 @@ from itertools import product
 from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar, get_args
 
 from reconros_zenoh.errors import ExperimentError
+from reconros_zenoh.experiments.endpoints import free_endpoint
 from reconros_zenoh.experiments.gateway import Cell, Times, Variant
 from reconros_zenoh.experiments.gateway_processes import run_board, run_listener, run_publisher
 from reconros_zenoh.experiments.interruption import until_interrupted
 from reconros_zenoh.experiments.processes import Processes, receive, send
 from reconros_zenoh.experiments.provenance import host
-from reconros_zenoh.experiments.wall import free_port
 from reconros_zenoh.mapping.graph import Side
 from reconros_zenoh.transport.zenoh import ZenohRouter
 from reconros_zenoh.transport.zenoh_session import has_shared_memory
@@ -78,7 +78,7 @@ def measure_native(
     """
     cells: list[Cell] = []
     with until_interrupted() as interruption, ExitStack() as networks:
-        routers = {variant: f"tcp/127.0.0.1:{free_port()}" for variant in get_args(Variant)}
+        routers = {variant: free_endpoint() for variant in get_args(Variant)}
         for endpoint in routers.values():
             networks.enter_context(ZenohRouter.open(endpoint))
         for size, count in product(sizes, counts):

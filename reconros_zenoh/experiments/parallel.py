@@ -14,7 +14,7 @@ import numpy as np
 from reconros_zenoh.errors import ReconrosError
 from reconros_zenoh.experiments.processes import Processes, commands, receive, send
 from reconros_zenoh.experiments.roundtrip import CLIENTS
-from reconros_zenoh.experiments.virtual import run_clients
+from reconros_zenoh.experiments.roundtrip_virtual import run_clients
 from reconros_zenoh.measure.record import Record
 
 if TYPE_CHECKING:

@@ -69,7 +69,7 @@ class Plan:
 
 @dataclass(slots=True)
 class BoardReport:
-    """What the boards said of themselves (`board.control.status`) at the end or interruption, by mapping."""
+    """What the boards said of themselves (`board.status`) at the end or interruption, by mapping."""
 
     statuses: dict[str, Mapping[str, Any]] = field(default_factory=dict)
 

@@ -21,8 +21,8 @@ from table import arguments, print_result
 from reconros_zenoh.board.profile import read_profile
 from reconros_zenoh.cli.experiment import MAPPINGS
 from reconros_zenoh.experiments.roundtrip import CLIENTS, application
+from reconros_zenoh.experiments.roundtrip_virtual import add_board_and_clients
 from reconros_zenoh.experiments.simulation import Simulation
-from reconros_zenoh.experiments.virtual import add_board_and_clients
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator

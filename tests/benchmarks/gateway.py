@@ -17,10 +17,11 @@ from typing import TYPE_CHECKING, Any
 
 import zenoh
 from overhead import raw_session
-from table import arguments, free_port, print_result
+from table import arguments, print_result
 
 from reconros_zenoh.applications.gateway.nodes import random_body
 from reconros_zenoh.clock.process import tune_process
+from reconros_zenoh.experiments.endpoints import free_endpoint
 from reconros_zenoh.experiments.gateway import COUNTS, SIZES
 from reconros_zenoh.experiments.gateway_native import Setup, copies, native_setup, take_turns
 from reconros_zenoh.experiments.gateway_processes import Receiver
@@ -106,7 +107,7 @@ def main() -> None:
     parser.add_argument("--sizes", nargs="+", type=int, default=list(SIZES.values()), help="bytes")
     parser.add_argument("--subscribers", nargs="+", type=int, default=list(COUNTS))
     chosen = parser.parse_args()
-    routers = [f"tcp/127.0.0.1:{free_port()}" for _ in range(3)]
+    routers = [free_endpoint() for _ in range(3)]
     with ExitStack() as networks:
         for router in routers:
             networks.enter_context(ZenohRouter.open(router))

@@ -24,9 +24,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import zenoh
-from table import arguments, free_port, print_result
+from table import arguments, print_result
 
 from reconros_zenoh.clock.process import tune_memory, tune_process
+from reconros_zenoh.experiments.endpoints import free_endpoint
 from reconros_zenoh.rmw.node import Context
 from reconros_zenoh.ros.image import image_message
 from reconros_zenoh.ros.type_registry import TypeRegistry
@@ -125,7 +126,7 @@ def main() -> None:
 def run() -> list[dict[str, Any]]:
     """Start the processes of both sides and return a row per message."""
     tune_process()
-    router = f"tcp/127.0.0.1:{free_port()}"
+    router = free_endpoint()
     board = ["-m", "board_daemon", str(ECHO), "--profile=native", "--mapping=software", "--name=echo"]
     with ExitStack() as stack:
         stack.enter_context(ZenohRouter.open(router))

@@ -1,10 +1,9 @@
-"""What the benchmarks share: arguments, a free port, and their result as a table or as JSON."""
+"""What the benchmarks share: arguments, and their result as a table or as JSON."""
 
 from __future__ import annotations
 
 import argparse
 import json
-import socket
 from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
@@ -19,13 +18,6 @@ def arguments(description: str) -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(description=description)
     parser.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
     return parser
-
-
-def free_port() -> int:
-    """Return a port of the loopback interface that was free just now."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
 
 
 def print_result(benchmark: str, rows: Sequence[Mapping[str, Any]], *, as_json: bool) -> None:

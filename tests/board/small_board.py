@@ -29,6 +29,15 @@ if TYPE_CHECKING:
 BITSTREAM_BYTES = 2000
 """Of every slot; the ICAP takes two bytes per nanosecond, so that a write takes 1000 ns."""
 
+TOPICS = {
+    "publish": 1_000_000,
+    "notify_hardware": 10_000,
+    "notify_software": 9_000,
+    "copy_in": 3,
+    "copy_out": 0.5,
+}
+"""Constants of topics inside the board, so far apart that a sum tells what it is made of."""
+
 types = cache(TypeRegistry)
 
 

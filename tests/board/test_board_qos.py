@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from octets import OCTETS, octets
 from small_board import desktop, small_board, small_profile, types
 
 from reconros_zenoh.board.sources import SubscriptionSource
@@ -14,13 +15,7 @@ from reconros_zenoh.board.writers import TopicWriter
 from reconros_zenoh.ros.qos import Durability, History, QosProfile, Reliability
 
 WORD = types().message("std_msgs/msg/UInt32")
-OCTETS = types().message("std_msgs/msg/UInt8MultiArray")
 LARGE = np.zeros(1000, np.uint8)
-
-
-def octets(data: Any) -> Any:
-    layout = types().message("std_msgs/msg/MultiArrayLayout").cls(dim=[], data_offset=0)
-    return OCTETS.cls(layout=layout, data=data)
 
 
 def received(

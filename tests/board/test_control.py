@@ -9,9 +9,10 @@ import pytest
 from small_board import Tickets, desktop, logging_thread, small_board, small_profile, types
 
 from reconros_zenoh.board import control
-from reconros_zenoh.board.control import ControlServer, alive_key, ask_status, claim_name, status
+from reconros_zenoh.board.control import ControlServer, alive_key, ask_status, claim_name
 from reconros_zenoh.board.executor import Executor
 from reconros_zenoh.board.sources import SubscriptionSource
+from reconros_zenoh.board.status import status
 from reconros_zenoh.clock.virtual import VirtualEnvironment
 from reconros_zenoh.clock.wall import WallEnvironment
 from reconros_zenoh.errors import BadMessageError, TransportError, UsageError

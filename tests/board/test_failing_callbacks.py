@@ -6,8 +6,8 @@ import logging
 import sys
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 import pytest
+from octets import OCTETS, octets
 from small_board import Tickets, desktop, small_board, small_profile, start, types
 
 from reconros_zenoh.board.executor import Executor
@@ -351,14 +351,6 @@ def test_hardware_callbacks_that_are_not_written_as_they_must_be(
         assert text in str(caplog.records[0].exc_info[1])  # type: ignore[index]
 
 
-BYTES = types().message("std_msgs/msg/UInt8MultiArray")
-
-
-def a_message(value: int) -> Any:
-    layout = types().message("std_msgs/msg/MultiArrayLayout").cls(dim=[], data_offset=0)
-    return BYTES.cls(layout=layout, data=np.full(4, value, np.uint8))
-
-
 @pytest.mark.parametrize("way", ["network", "board", "stream", "stream with overhead"])
 @pytest.mark.parametrize(
     "wrong", [lambda: sys.exit(3), lambda: {}["no"], speechless], ids=["exit", "error", "speechless"]
@@ -375,7 +367,7 @@ def test_a_check_that_fails_itself_refuses_the_message_and_harms_nobody(
         ),
         slots=2,
     )
-    topic, node = board.hardware_topic("/a", BYTES), board.context.node("n")
+    topic, node = board.hardware_topic("/a", OCTETS), board.context.node("n")
 
     def check(message: Any) -> None:
         if message.data[0] == 0:
@@ -395,21 +387,21 @@ def test_a_check_that_fails_itself_refuses_the_message_and_harms_nobody(
         source = (
             HmtSource(board, topic, FifoPlan())
             if way.startswith("stream")
-            else SubscriptionSource(board, node, BYTES, "/a")
+            else SubscriptionSource(board, node, OCTETS, "/a")
         )
         executor.add_hw_callback(
             name, [slot], CallbackKind.SUB, source, listen(name), check if name == "picky" else None
         )
     executor.spin()
-    publisher = desktop(board).node("c").publisher(BYTES, "/a")
-    writer = HmtWriter(topic) if way.startswith("stream") else board.writer(node, BYTES, "/a")
+    publisher = desktop(board).node("c").publisher(OCTETS, "/a")
+    writer = HmtWriter(topic) if way.startswith("stream") else board.writer(node, OCTETS, "/a")
     # More than a FIFO holds: a message that is refused must give its place back.
     for value in (0, 0, 0, 1):
         if way == "network":
-            publisher.publish(a_message(value))
+            publisher.publish(octets([value]))
         else:
             timeline = Timeline(board.environment, board.environment.now)
-            start(board.environment, writer.publish(a_message(value), timeline))
+            start(board.environment, writer.publish(octets([value]), timeline))
     board.environment.run(until=100_000)
     assert heard == {"picky": [1], "patient": [0, 0, 0, 1]}
     assert board.context.rejections.counts() == {"check_failed": 3}

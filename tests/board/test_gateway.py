@@ -7,15 +7,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 import pytest
-from small_board import desktop, small_board, small_profile, start, transferred_bytes, types
+from octets import OCTETS, size_of, sized
+from small_board import TOPICS, desktop, small_board, small_profile, start, transferred_bytes, types
 
-from reconros_zenoh.board.control import gateways
 from reconros_zenoh.board.hmt import Fifo, FifoPlan
 from reconros_zenoh.board.profile import Profile, read_profile
 from reconros_zenoh.board.sources import SubscriptionSource
 from reconros_zenoh.board.spans import Timeline
+from reconros_zenoh.board.status import gateways
 from reconros_zenoh.clock.virtual import VirtualEnvironment
 from reconros_zenoh.errors import UsageError
 from reconros_zenoh.ros.graph import EndpointKind, EndpointToken, parse, tokens_expression
@@ -25,31 +25,9 @@ from reconros_zenoh.transport.simulated import SimulatedNetwork
 if TYPE_CHECKING:
     from reconros_zenoh.board.board import Board
 
-TOPICS = {
-    "publish": 1_000_000,
-    "notify_hardware": 10_000,
-    "notify_software": 9_000,
-    "copy_in": 3,
-    "copy_out": 0.5,
-}
 A, D, E, K, L = TOPICS.values()
 G, C = 100_000_000, 20_000_000
-words = types().message("std_msgs/msg/UInt8MultiArray")
-layout = types().message("std_msgs/msg/MultiArrayLayout").cls(dim=[], data_offset=0)
-HEADER = 16
 U = 1000
-
-
-def size_of(body: Any) -> int:
-    return sum(map(len, words.encode(body)))
-
-
-def message(number: int = 0, size: int = U) -> Any:
-    """A message of `size` bytes on the wire whose first byte is the number; it cannot change any more."""
-    data = np.zeros(size - HEADER, np.uint8)
-    data[0] = number
-    data.flags.writeable = False
-    return words.cls(layout=layout, data=data)
 
 
 def modelled(**options: Any) -> Profile:
@@ -63,20 +41,20 @@ class Side:
         self.board = board
         self.environment = board.environment
         self.node = board.context.node("n")
-        self.topic = board.hardware_topic("/a", words)
+        self.topic = board.hardware_topic("/a", OCTETS)
         self.hardware: list[list[tuple[int, Any]]] = [[] for _ in range(subscribers)]
         for heard in self.hardware:
             self._listen(heard)
         self.software: list[tuple[int, Any]] = []
-        source = SubscriptionSource(board, self.node, words, "/a")
+        source = SubscriptionSource(board, self.node, OCTETS, "/a")
 
         def note() -> None:
             event = source.take()
             self.software.append((self.environment.now, event.message))
 
         source.open(note)
-        self.writer = board.writer(self.node, words, "/a")
-        self.gateway = board.add_gateway("bridge", "/a", "/a", words, 0, qos)
+        self.writer = board.writer(self.node, OCTETS, "/a")
+        self.gateway = board.add_gateway("bridge", "/a", "/a", OCTETS, 0, qos)
 
     def _listen(self, heard: list[tuple[int, Any]]) -> None:
         def note() -> None:
@@ -107,7 +85,7 @@ def times_of(heard: list[tuple[int, Any]], body: Any) -> list[int]:
 @pytest.mark.parametrize("subscribers", [1, 4])
 def test_from_hardware_a_message_is_streamed_to_all_and_written_to_memory_once(subscribers: int) -> None:
     side = Side(small_board(modelled(), 2), subscribers)
-    body = message()
+    body = sized(U)
     side.publish_in_hardware(body)
     side.environment.run()
     assert [times_of(heard, body) for heard in side.hardware] == [[U + G]] * subscribers
@@ -123,7 +101,7 @@ def test_from_hardware_a_message_is_streamed_to_all_and_written_to_memory_once(s
 @pytest.mark.parametrize("subscribers", [1, 4])
 def test_from_software_it_is_read_from_memory_once_while_it_is_streamed(subscribers: int) -> None:
     side = Side(small_board(modelled(), 2), subscribers)
-    body = message()
+    body = sized(U)
     side.publish_in_software(body)
     side.environment.run()
     assert [times_of(heard, body) for heard in side.hardware] == [[A + K * U + D + U + G]] * subscribers
@@ -134,9 +112,9 @@ def test_from_software_it_is_read_from_memory_once_while_it_is_streamed(subscrib
 def test_a_message_between_request_and_cancel_is_forwarded() -> None:
     side = Side(small_board(modelled(), 2))
     # Published on the SMT so that it is ready while the core cancels for what came over the HMT.
-    side.publish_in_software(message(1))
+    side.publish_in_software(sized(U, first=1))
     side.environment.run(until=A + K * U + D - 2 * U)
-    side.publish_in_hardware(message(2))
+    side.publish_in_hardware(sized(U, first=2))
     side.environment.run()
     assert side.gateway.late == 1
     assert side.numbers() == [[2, 1], [2, 1], [1, 2]]
@@ -147,7 +125,7 @@ def test_no_word_is_streamed_before_it_is_read_from_memory() -> None:
     side = Side(small_board(small_profile(cores=4), 2))
     start(side.environment, side.board.memif.transfer(10 * U))  # another slot: half of the bandwidth is left
     for number in (1, 2):
-        side.publish_in_software(message(number))
+        side.publish_in_software(sized(U, first=number))
     side.environment.run()
     assert [time_ns for time_ns, _ in side.hardware[0]] == [2 * U, 4 * U]
 
@@ -155,8 +133,8 @@ def test_no_word_is_streamed_before_it_is_read_from_memory() -> None:
 def test_messages_from_both_sides_take_turns() -> None:
     side = Side(small_board(modelled(), 2))
     for number in range(6):
-        side.publish_in_software(message(number))
-        side.publish_in_hardware(message(100 + number))
+        side.publish_in_software(sized(U, first=number))
+        side.publish_in_hardware(sized(U, first=100 + number))
     side.environment.run()
     for heard in side.numbers():
         assert [number for number in heard if number < 100] == list(range(6))
@@ -175,11 +153,11 @@ def test_boards_whose_gateways_share_a_topic_hear_each_other_once(profile: Profi
     network.environment.run()
     heard_elsewhere: list[int] = []
     node = desktop(sides[0].board).node("desk")
-    node.subscription(words, "/a", lambda received: heard_elsewhere.append(int(received.message.data[0])))
+    node.subscription(OCTETS, "/a", lambda received: heard_elsewhere.append(int(received.message.data[0])))
     network.environment.run()
     for number, side in enumerate(sides):
-        side.publish_in_hardware(message(number))
-        side.publish_in_software(message(10 + number))
+        side.publish_in_hardware(sized(U, first=number))
+        side.publish_in_software(sized(U, first=10 + number))
     network.environment.run()
     for side in sides:
         for heard in side.numbers():
@@ -194,13 +172,13 @@ def test_a_message_that_no_fifo_holds_is_refused_and_the_gateway_goes_on(
     profile = small_profile(topics=topics, cores=4, hmt_overhead_ns=G, cancel_ns=C)
     side = Side(small_board(profile, 2))
     side.environment.run()
-    elsewhere = [desktop(side.board).node(name).publisher(words, "/a") for name in ("x", "y")]
+    elsewhere = [desktop(side.board).node(name).publisher(OCTETS, "/a") for name in ("x", "y")]
     side.topic.subscribe(Fifo(FifoPlan(100, message_bytes=U), lambda: None, None, cut_through=False))
     for _ in range(2):
-        side.publish_in_software(message(1, U + 1))
+        side.publish_in_software(sized(U + 1, first=1))
         for publisher in elsewhere:
-            publisher.publish(message(1, U + 1))
-    side.publish_in_software(message(2))
+            publisher.publish(sized(U + 1, first=1))
+    side.publish_in_software(sized(U, first=2))
     side.environment.run()
     assert side.gateway.refused == 6
     assert side.board.context.rejections.counts() == {"fifo_size": 6}
@@ -215,11 +193,11 @@ def test_a_second_gateway_on_a_topic_is_refused_and_so_is_another_type() -> None
     side = Side(small_board(modelled(), 2))
     for hmt, smt, taken in (("/a", "/b", "hmt/board0/a"), ("/b", "/a", "/a")):
         with pytest.raises(UsageError, match=f"^{taken} has a gateway on board 'board0' already"):
-            side.board.add_gateway("second", hmt, smt, words, 1)
-    side.board.hardware_topic("/c", words)
+            side.board.add_gateway("second", hmt, smt, OCTETS, 1)
+    side.board.hardware_topic("/c", OCTETS)
     with pytest.raises(UsageError, match="has the type std_msgs/msg/UInt8MultiArray"):
         side.board.add_gateway("second", "/c", "/c", types().message("std_msgs/msg/UInt32"), 1)
-    side.publish_in_software(message(1))
+    side.publish_in_software(sized(U, first=1))
     side.environment.run()
     assert side.numbers() == [[1], [1], [1]]
 
@@ -230,15 +208,15 @@ def test_its_slot_holds_it_from_the_start_and_nothing_else() -> None:
     assert slot.holds is not None
     assert (slot.holds.callback, slot.reconfigurations) == ("bridge", 0)
     with pytest.raises(UsageError, match="'second' cannot be in slot 0, which is for bridge"):
-        side.board.add_gateway("second", "/b", "/b", words, 0)
+        side.board.add_gateway("second", "/b", "/b", OCTETS, 0)
     with pytest.raises(UsageError, match=r"there is no slot 9. The board has \["):
-        side.board.add_gateway("second", "/b", "/b", words, 9)
+        side.board.add_gateway("second", "/b", "/b", OCTETS, 9)
 
 
 def test_its_ends_have_its_qos() -> None:
     board = small_board(modelled(), 2)
     qos = QosProfile(Reliability.BEST_EFFORT, Durability.TRANSIENT_LOCAL, depth=3)
-    board.add_gateway("bridge", "/a", "/a", words, 0, qos)
+    board.add_gateway("bridge", "/a", "/a", OCTETS, 0, qos)
     seen = [parse(key) for key in desktop(board).transport.tokens(tokens_expression(0), 0)]
     ends = {token.kind: token.qos for token in seen if isinstance(token, EndpointToken)}
     assert ends == {EndpointKind.PUBLISHER: qos, EndpointKind.SUBSCRIPTION: qos}
@@ -247,14 +225,14 @@ def test_its_ends_have_its_qos() -> None:
 def test_one_that_is_added_late_gets_what_a_publisher_of_its_board_keeps() -> None:
     board = small_board(modelled(), 2)
     qos = QosProfile(durability=Durability.TRANSIENT_LOCAL, depth=2)
-    writer = board.writer(board.context.node("n"), words, "/a", qos)
+    writer = board.writer(board.context.node("n"), OCTETS, "/a", qos)
     for number in range(5):
-        writer.send(writer.encode(message(number)), Timeline(board.environment, board.environment.now))
+        writer.send(writer.encode(sized(U, first=number)), Timeline(board.environment, board.environment.now))
         board.environment.run()
     heard: list[int] = []
     fifo = Fifo(FifoPlan(), lambda: heard.append(int(fifo.take().message.data[0])), None, cut_through=False)
-    board.hardware_topic("/a", words).subscribe(fifo)
-    board.add_gateway("late", "/a", "/a", words, 0, qos, at_power_up=False)
+    board.hardware_topic("/a", OCTETS).subscribe(fifo)
+    board.add_gateway("late", "/a", "/a", OCTETS, 0, qos, at_power_up=False)
     board.environment.run()
     assert heard == [3, 4]
 
@@ -264,7 +242,7 @@ def test_with_a_short_queue_it_keeps_the_newest() -> None:
     nobody_takes = Fifo(FifoPlan(depth=1), lambda: None, None, cut_through=False)
     side.topic.subscribe(nobody_takes)
     for number in range(5):
-        side.publish_in_software(message(number))
+        side.publish_in_software(sized(U, first=number))
     side.environment.run()
     # 0 fills the FIFO, the core waits with 1; 4 has pushed 2 and 3 out.
     assert side.gateway.dropped == 2
@@ -278,7 +256,7 @@ def test_it_takes_no_slot_of_a_callback() -> None:
     board = small_board(modelled(), 1)
     board.slots[0].admit("loaded")
     with pytest.raises(UsageError, match=r"'g' cannot be in slot 0, which is for loaded\. Give one of them"):
-        board.add_gateway("g", "/a", "/a", words, 0)
+        board.add_gateway("g", "/a", "/a", OCTETS, 0)
 
 
 def test_a_profile_must_know_gateways() -> None:
@@ -286,7 +264,7 @@ def test_a_profile_must_know_gateways() -> None:
     assert profile.model is not None
     ignorant = profile.model_copy(update={"model": profile.model.model_copy(update={"gateway": None})})
     with pytest.raises(UsageError, match=r"\[model.gateway\]"):
-        small_board(ignorant, 1).add_gateway("g", "/a", "/a", words, 0)
+        small_board(ignorant, 1).add_gateway("g", "/a", "/a", OCTETS, 0)
 
 
 def test_a_closed_board_takes_its_gateway_out_of_the_graph() -> None:
@@ -297,7 +275,7 @@ def test_a_closed_board_takes_its_gateway_out_of_the_graph() -> None:
     network.environment.run()
     left.board.close()
     left.node.close()
-    stays.publish_in_hardware(message(1))
+    stays.publish_in_hardware(sized(U, first=1))
     network.environment.run()
     assert stays.numbers() == [[1], [1], [1]]
     assert left.numbers() == [[], [], []]
@@ -305,8 +283,8 @@ def test_a_closed_board_takes_its_gateway_out_of_the_graph() -> None:
 
 def test_the_status_tells_what_passed() -> None:
     side = Side(small_board(modelled(), 2))
-    side.publish_in_software(message(1))
-    side.publish_in_hardware(message(2))
+    side.publish_in_software(sized(U, first=1))
+    side.publish_in_hardware(sized(U, first=2))
     side.environment.run()
     assert gateways(side.board) == [
         {

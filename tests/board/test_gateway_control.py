@@ -17,11 +17,11 @@ from small_board import (
 )
 
 from reconros_zenoh.board.answers import VERSION
-from reconros_zenoh.board.control import gateways
 from reconros_zenoh.board.executor import Executor
 from reconros_zenoh.board.gateway_control import GatewayServer, check_type
 from reconros_zenoh.board.hmt import Fifo, FifoPlan, HmtWriter
 from reconros_zenoh.board.spans import Timeline
+from reconros_zenoh.board.status import gateways
 from reconros_zenoh.errors import UsageError
 from reconros_zenoh.executor.callbacks import CallbackKind
 from reconros_zenoh.ros.qos import QosProfile

@@ -7,15 +7,16 @@ from typing import TYPE_CHECKING, Any
 import msgpack
 import numpy as np
 import pytest
+from octets import HEADER, OCTETS, octets, size_of, sized
 from small_board import Tickets, desktop, ignore, small_board, small_profile, start, transferred_bytes, types
 
 from reconros_zenoh.board.board import Board
-from reconros_zenoh.board.control import status
 from reconros_zenoh.board.executor import Executor
 from reconros_zenoh.board.hmt import Fifo, FifoPlan, HmtSource, HmtWriter
 from reconros_zenoh.board.kernel import Kernel
 from reconros_zenoh.board.profile import read_profile
 from reconros_zenoh.board.spans import Timeline
+from reconros_zenoh.board.status import status
 from reconros_zenoh.errors import BadMessageError, UsageError
 from reconros_zenoh.executor.callbacks import CallbackKind
 from reconros_zenoh.gateway.filters import PublisherFilter
@@ -24,19 +25,6 @@ from reconros_zenoh.ros.qos import QosProfile
 if TYPE_CHECKING:
     from small_board import Steps
 
-words = types().message("std_msgs/msg/UInt8MultiArray")
-layout = types().message("std_msgs/msg/MultiArrayLayout").cls(dim=[], data_offset=0)
-HEADER = 4 + 4 + 4 + 4  # encapsulation, dimensions, offset, count
-
-
-def size_of(body: Any) -> int:
-    return sum(map(len, words.encode(body)))
-
-
-def message(size: int) -> Any:
-    """A message of `size` bytes on the wire."""
-    return words.cls(layout=layout, data=np.zeros(size - HEADER, np.uint8))
-
 
 class Stream:
     """A hardware-mapped topic and what its subscribers saw, at which time."""
@@ -44,7 +32,7 @@ class Stream:
     def __init__(self, board: Board | None = None, **options: Any) -> None:
         self.board = board or small_board(small_profile(**options))
         self.environment = self.board.environment
-        self.topic = self.board.hardware_topic("/a", words)
+        self.topic = self.board.hardware_topic("/a", OCTETS)
         self.seen: list[tuple[int, str]] = []
 
     def fifo(self, name: str, plan: FifoPlan | None = None, **options: Any) -> Fifo:
@@ -67,7 +55,7 @@ def test_a_message_takes_its_size_on_the_stream_and_its_overhead_at_each_subscri
     stream = Stream(hmt_overhead_ns=7)
     stream.fifo("a")
     stream.fifo("b")
-    stream.environment.run(until=stream.publish(message(100)))
+    stream.environment.run(until=stream.publish(sized(100)))
     assert stream.environment.now == 100
     stream.environment.run()
     assert stream.seen == [(107, "a"), (107, "b")]
@@ -76,7 +64,7 @@ def test_a_message_takes_its_size_on_the_stream_and_its_overhead_at_each_subscri
 def test_one_message_passes_at_a_time_in_the_order_of_publication() -> None:
     stream = Stream()
     fifo = stream.fifo("a")
-    first, second = message(100), message(50)
+    first, second = sized(100), sized(50)
     stream.publish(first, "p")
     stream.publish(second, "q")
     stream.environment.run()
@@ -87,7 +75,7 @@ def test_one_message_passes_at_a_time_in_the_order_of_publication() -> None:
 def test_a_reader_that_cuts_through_has_the_first_word_at_once() -> None:
     stream = Stream(hmt_overhead_ns=7)
     fifo = stream.fifo("a", cut_through=True)
-    stream.publish(message(100))
+    stream.publish(sized(100))
     assert stream.seen == [(0, "a")]
     complete = fifo.take().complete
     stream.environment.run()
@@ -98,8 +86,8 @@ def test_a_full_fifo_that_blocks_holds_the_stream_up_until_there_is_room() -> No
     stream = Stream()
     slow = stream.fifo("slow", FifoPlan(depth=1))
     stream.fifo("quick")
-    stream.publish(message(100))
-    held_up = stream.publish(message(100))
+    stream.publish(sized(100))
+    held_up = stream.publish(sized(100))
     stream.environment.call_later(1000, slow.take)
     stream.environment.run(until=held_up)
     assert stream.environment.now == 1100
@@ -111,7 +99,7 @@ def test_a_fifo_of_which_nothing_is_declared_blocks_the_third_message() -> None:
     stream = Stream()
     fifo = stream.fifo("a", FifoPlan())
     for _ in range(3):
-        stream.publish(message(100))
+        stream.publish(sized(100))
     stream.environment.run()
     assert stream.seen == [(100, "a"), (200, "a")]
     fifo.take()
@@ -123,8 +111,8 @@ def test_a_full_fifo_that_drops_holds_nobody_up() -> None:
     stream = Stream()
     slow = stream.fifo("slow", FifoPlan(1, "drop"))
     stream.fifo("quick")
-    stream.publish(message(100))
-    stream.publish(message(100))
+    stream.publish(sized(100))
+    stream.publish(sized(100))
     stream.environment.run()
     assert stream.seen == [(100, "slow"), (100, "quick"), (200, "quick")]
     assert (slow.dropped, stream.topic.dropped, stream.topic.waits) == (1, 1, 0)
@@ -134,10 +122,10 @@ def test_a_message_larger_than_a_fifo_is_refused_and_reaches_nobody() -> None:
     stream = Stream()
     stream.fifo("small", FifoPlan(message_bytes=99))
     stream.fifo("large")
-    refused = stream.publish(message(100))
+    refused = stream.publish(sized(100))
     with pytest.raises(BadMessageError, match=r"100 bytes on hmt/board0/a does not fit a FIFO .* for 99"):
         stream.environment.run(until=refused)
-    stream.publish(message(99))
+    stream.publish(sized(99))
     stream.environment.run()
     assert [name for _, name in stream.seen] == ["small", "large"]
 
@@ -145,9 +133,9 @@ def test_a_message_larger_than_a_fifo_is_refused_and_reaches_nobody() -> None:
 def test_a_subscriber_does_not_hear_the_publisher_that_its_filter_names() -> None:
     stream = Stream()
     stream.fifo("own", FifoPlan(depth=1), own=PublisherFilter("p"))
-    stream.publish(message(100), "p")
-    stream.publish(message(100), "p")
-    stream.publish(message(100), "q")
+    stream.publish(sized(100), "p")
+    stream.publish(sized(100), "p")
+    stream.publish(sized(100), "q")
     stream.environment.run()
     assert stream.seen == [(300, "own")]
 
@@ -163,13 +151,13 @@ def test_nothing_is_in_the_network_but_through_the_tap_of_an_open_board() -> Non
         )
         stream = Stream(board)
         stream.fifo("a")
-        body = message(20)
+        body = sized(20)
         stream.publish(body)
         board.environment.run()
         board.close()
-        stream.publish(message(30))
+        stream.publish(sized(30))
         board.environment.run()
-    assert heard == [(True, "hmt/b/a", b"".join(words.encode(body)))]
+    assert heard == [(True, "hmt/b/a", b"".join(OCTETS.encode(body)))]
 
 
 def relay(writer: HmtWriter, log: list[Any]) -> Any:
@@ -185,7 +173,7 @@ def relay(writer: HmtWriter, log: list[Any]) -> Any:
 
 def test_a_kernel_between_two_streams_costs_no_memif() -> None:
     board = small_board(small_profile({"relay": (0, 0)}), slots=1)
-    into, out = board.hardware_topic("/in", words), board.hardware_topic("/out", words)
+    into, out = board.hardware_topic("/in", OCTETS), board.hardware_topic("/out", OCTETS)
     arrived = Fifo(FifoPlan(), lambda: None, None, cut_through=False)
     out.subscribe(arrived)
     executor, log = Executor(board, 0, 1), []
@@ -193,7 +181,7 @@ def test_a_kernel_between_two_streams_costs_no_memif() -> None:
         "relay", [0], CallbackKind.SUB, HmtSource(board, into, FifoPlan()), relay(HmtWriter(out), log)
     )
     executor.spin()
-    body = message(100)
+    body = octets(np.zeros(84))
     start(board.environment, into.publish("p", body, size_of(body), Timeline(board.environment, 0)))
     board.environment.run()
     assert log[0] is body.data
@@ -216,7 +204,7 @@ def test_what_becomes_of_a_message_after_it_was_published_is_the_publishers_own_
     data = np.zeros(84, np.uint8)
     data.flags.writeable = writeable
     board = small_board(small_profile({"a": (0, 0)}), slots=1)
-    topic = board.hardware_topic("/out", words)
+    topic = board.hardware_topic("/out", OCTETS)
     arrived = Fifo(FifoPlan(), lambda: None, None, cut_through=False)
     other = Fifo(FifoPlan(), lambda: None, None, cut_through=False)
     topic.subscribe(arrived)
@@ -224,9 +212,9 @@ def test_what_becomes_of_a_message_after_it_was_published_is_the_publishers_own_
     writer = HmtWriter(topic)
 
     def thread(hardware: Any) -> Steps:
-        body = words.cls(layout=layout, data=data)
+        body = octets(data)
         if writeable:
-            board.environment.call_later(50, data.fill, 1)  # while the words pass
+            board.environment.call_later(50, data.fill, 1)  # while the bytes pass
         yield from hardware.publish(writer, body)
         body.data = np.full(84, 2, np.uint8)
         yield from hardware.publish(writer, body)
@@ -254,10 +242,10 @@ def test_a_kernel_at_a_software_mapped_topic_pays_the_memif_for_the_same_lines()
         [0],
         CallbackKind.SUB,
         tickets,
-        relay(HmtWriter(board.hardware_topic("/out", words)), []),
+        relay(HmtWriter(board.hardware_topic("/out", OCTETS)), []),
     )
     executor.spin()
-    tickets.put(message(100))
+    tickets.put(sized(100))
     board.environment.run()
     assert transferred_bytes(board) == 100 - HEADER
 
@@ -266,7 +254,7 @@ def test_a_bad_message_is_counted_logged_once_per_callback_and_its_place_is_free
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     board = small_board(small_profile({"left": (0, 0), "right": (0, 0)}), slots=2)
-    topic = board.hardware_topic("/a", words)
+    topic = board.hardware_topic("/a", OCTETS)
     source = HmtSource(board, topic, FifoPlan(depth=1))
 
     def check(_: Any) -> None:
@@ -281,7 +269,7 @@ def test_a_bad_message_is_counted_logged_once_per_callback_and_its_place_is_free
     executor.spin()
     for _ in range(3):
         for end in tickets:
-            end.put(message(20))
+            end.put(sized(20))
     board.environment.run()
     assert not source.is_ready()
     assert topic.passed == 6
@@ -294,29 +282,29 @@ def test_a_bad_message_is_counted_logged_once_per_callback_and_its_place_is_free
 
 def test_no_end_of_a_stream_runs_in_software() -> None:
     board = small_board(small_profile({"a": (0, 0)}))
-    topic = board.hardware_topic("/a", words)
+    topic = board.hardware_topic("/a", OCTETS)
     with pytest.raises(UsageError, match="'a' reads a hardware-mapped topic"):
         Executor(board, 1, 0).add_sw_callback(
             "a", CallbackKind.SUB, HmtSource(board, topic, FifoPlan()), ignore
         )
     with pytest.raises(UsageError, match="hmt/board0/a is mapped to hardware"):
-        HmtWriter(topic).encode(message(20))
+        HmtWriter(topic).encode(sized(20))
 
 
 def test_a_topic_has_one_type_and_a_profile_must_know_streams() -> None:
     board = small_board(small_profile())
-    board.hardware_topic("/a", words)
+    board.hardware_topic("/a", OCTETS)
     with pytest.raises(UsageError, match=r"hmt/board0/a has the type std_msgs/msg/UInt8MultiArray"):
         board.hardware_topic("/a", types().message("std_msgs/msg/UInt32"))
     with pytest.raises(UsageError, match=r"\[model.hmt\]"):
-        small_board(read_profile("miniitx-zynq7100")).hardware_topic("/a", words)
+        small_board(read_profile("miniitx-zynq7100")).hardware_topic("/a", OCTETS)
 
 
 def test_the_status_counts_what_passed() -> None:
     stream = Stream(small_board(small_profile()))
     stream.fifo("a", FifoPlan(1, "drop"))
-    stream.publish(message(20))
-    stream.publish(message(20))
+    stream.publish(sized(20))
+    stream.publish(sized(20))
     stream.environment.run()
     shown = msgpack.unpackb(msgpack.packb(status(stream.board, Executor(stream.board, 1, 0))))
     assert shown["hmt"] == {"hmt/board0/a": {"passed": 2, "dropped": 1, "waits": 0}}
@@ -325,7 +313,7 @@ def test_the_status_counts_what_passed() -> None:
 def test_pointers_and_plain_kernels_work_on_a_stream_as_well() -> None:
     def walk(hardware: Any) -> Steps:
         pointer = yield from hardware.get_init_data()
-        pointer = yield from hardware.mem_read(pointer + hardware.offsetof(words, "data.data"), 4)
+        pointer = yield from hardware.mem_read(pointer + hardware.offsetof(OCTETS, "data.data"), 4)
         walked.append((yield from hardware.mem_read(pointer[0], 84, np.uint8)))
 
     def double(data: Any) -> Any:
@@ -333,18 +321,16 @@ def test_pointers_and_plain_kernels_work_on_a_stream_as_well() -> None:
 
     walked: list[Any] = []
     board = small_board(small_profile({"walk": (0, 0), "kernel": (0, 0)}), slots=2)
-    into, out = board.hardware_topic("/in", words), board.hardware_topic("/out", words)
+    into, out = board.hardware_topic("/in", OCTETS), board.hardware_topic("/out", OCTETS)
     arrived = Fifo(FifoPlan(), lambda: None, None, cut_through=False)
     out.subscribe(arrived)
-    kernel = Kernel(
-        double, ("data",), lambda _, data: words.cls(layout=layout, data=data), publish=HmtWriter(out)
-    )
+    kernel = Kernel(double, ("data",), lambda _, data: octets(data), publish=HmtWriter(out))
     executor = Executor(board, 0, 2)
     for slot, (name, callback) in enumerate({"walk": walk, "kernel": kernel}.items()):
         source = HmtSource(board, into, FifoPlan())
         executor.add_hw_callback(name, [slot], CallbackKind.SUB, source, callback)
     executor.spin()
-    body = words.cls(layout=layout, data=np.arange(84, dtype=np.uint8))
+    body = octets(np.arange(84, dtype=np.uint8))
     start(board.environment, into.publish("p", body, size_of(body), Timeline(board.environment, 0)))
     board.environment.run()
     assert walked[0].tolist() == body.data.tolist()
@@ -361,11 +347,11 @@ def read_bytes(source: Any) -> int:
         yield from hardware.mem_read(*source(hardware, init))
 
     board = small_board(small_profile({"reader": (0, 0)}), slots=1)
-    topic = board.hardware_topic("/in", words)
+    topic = board.hardware_topic("/in", OCTETS)
     executor = Executor(board, 0, 1)
     executor.add_hw_callback("reader", [0], CallbackKind.SUB, HmtSource(board, topic, FifoPlan()), reader)
     executor.spin()
-    body = words.cls(layout=layout, data=WHOLE[:84])
+    body = octets(WHOLE[:84])
     start(board.environment, topic.publish("p", body, size_of(body), Timeline(board.environment, 0)))
     board.environment.run()
     assert (executor.calls, executor.failures) == ({"reader": 1}, {})
@@ -374,7 +360,7 @@ def read_bytes(source: Any) -> int:
 
 def block_of(hardware: Any, init: Any) -> int:
     """Where the bytes of `data` stand."""
-    pointer = hardware._board.memory.read(init + hardware.offsetof(words, "data.data"), 4)
+    pointer = hardware._board.memory.read(init + hardware.offsetof(OCTETS, "data.data"), 4)
     return int(pointer.view(np.uint32)[0])
 
 

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
-from small_board import desktop, small_board, small_profile, types
+from octets import HEADER, OCTETS, octets
+from small_board import TOPICS, desktop, small_board, small_profile
 
 from reconros_zenoh.board.executor import Executor
 from reconros_zenoh.board.local_topics import LocalTopicWriter
@@ -25,17 +26,7 @@ from reconros_zenoh.ros.qos import Durability, QosProfile
 if TYPE_CHECKING:
     from small_board import Steps
 
-TOPICS = {
-    "publish": 1_000_000,
-    "notify_hardware": 10_000,
-    "notify_software": 9_000,
-    "copy_in": 3,
-    "copy_out": 0.5,
-}
 A, D, E, K, L = TOPICS.values()
-words = types().message("std_msgs/msg/UInt8MultiArray")
-layout = types().message("std_msgs/msg/MultiArrayLayout").cls(dim=[], data_offset=0)
-HEADER = 16
 U = 1000
 
 
@@ -55,14 +46,14 @@ class Setup:
         self.got: dict[str, list[tuple[int, Any]]] = {name: [] for name in [*names, "s"]}
         executor = Executor(self.board, 1, hardware)
         for slot, name in enumerate(names):
-            source = SubscriptionSource(self.board, self.node, words, "/a")
+            source = SubscriptionSource(self.board, self.node, OCTETS, "/a")
             executor.add_hw_callback(name, [slot], CallbackKind.SUB, source, self.hardware(name))
-        self.software = SubscriptionSource(self.board, self.node, words, "/a")
+        self.software = SubscriptionSource(self.board, self.node, OCTETS, "/a")
         executor.add_sw_callback(
             "s", CallbackKind.SUB, self.software, lambda message, _: self.note("s", message)
         )
         executor.spin()
-        writer = self.board.writer(self.node, words, "/a")
+        writer = self.board.writer(self.node, OCTETS, "/a")
         assert isinstance(writer, LocalTopicWriter)
         self.writer = writer
         # The first message finds the slots empty.
@@ -83,7 +74,7 @@ class Setup:
         return thread
 
     def publish(self, *, hardware: bool, data: Any = None) -> Any:
-        body = words.cls(layout=layout, data=np.zeros(U, np.uint8) if data is None else data)
+        body = octets(np.zeros(U, np.uint8) if data is None else data)
         timeline = Timeline(self.environment, self.environment.now)
         if hardware:
             Activity(self.writer.publish(body, timeline))
@@ -108,7 +99,7 @@ def test_from_hardware_the_readers_share_the_memif_and_software_copies_at_its_sp
 
 def test_what_is_published_in_software_and_in_hardware_comes_in_order() -> None:
     setup = Setup(1)
-    bodies = [words.cls(layout=layout, data=np.array([number], np.uint8)) for number in range(4)]
+    bodies = [octets(np.array([number], np.uint8)) for number in range(4)]
     timeline = Timeline(setup.environment, setup.environment.now)
     for body in bodies[:3]:
         setup.writer.send(setup.writer.encode(body), timeline.fork())
@@ -120,8 +111,8 @@ def test_what_is_published_in_software_and_in_hardware_comes_in_order() -> None:
 
 def test_a_slot_whose_message_is_pushed_out_goes_on() -> None:
     setup = Setup(1)
-    writer = setup.board.writer(setup.node, words, "/a", QosProfile(depth=1))
-    body = words.cls(layout=layout, data=np.zeros(U, np.uint8))
+    writer = setup.board.writer(setup.node, OCTETS, "/a", QosProfile(depth=1))
+    body = octets(np.zeros(U, np.uint8))
     timelines = [Timeline(setup.environment, setup.environment.now) for _ in range(3)]
     for timeline in timelines:
         Activity(writer.publish(body, timeline))
@@ -156,7 +147,7 @@ def test_all_readers_get_one_copy_of_the_message_and_nothing_leaves_the_board() 
 def test_what_a_hardware_callback_publishes_keeps_it_in_the_stage_of_topics() -> None:
     setup = Setup(1)
     timeline = Timeline(setup.environment, setup.environment.now)
-    body = words.cls(layout=layout, data=np.zeros(U, np.uint8))
+    body = octets(np.zeros(U, np.uint8))
     Activity(setup.writer.publish(body, timeline))
     setup.environment.run()
     assert timeline.stages_ns == {"dds": A + D}
@@ -189,7 +180,9 @@ def test_what_becomes_of_a_message_after_it_was_published_is_the_publishers_own_
 def test_a_reader_elsewhere_gets_it_over_the_link_and_those_here_get_it_once() -> None:
     setup = Setup(2)
     heard = []
-    desktop(setup.board).node("desk").subscription(words, "/a", lambda _: heard.append(setup.environment.now))
+    desktop(setup.board).node("desk").subscription(
+        OCTETS, "/a", lambda _: heard.append(setup.environment.now)
+    )
     setup.environment.run()
     setup.publish(hardware=True)
     assert len(heard) == 1
@@ -199,7 +192,7 @@ def test_a_reader_elsewhere_gets_it_over_the_link_and_those_here_get_it_once() -
 
 def test_a_publisher_elsewhere_is_no_reader() -> None:
     setup = Setup(1)
-    desktop(setup.board).node("desk").publisher(words, "/a")
+    desktop(setup.board).node("desk").publisher(OCTETS, "/a")
     setup.environment.run()
     assert setup.board.topics is not None
     assert not setup.board.topics.is_read_elsewhere(setup.writer.key)
@@ -208,7 +201,7 @@ def test_a_publisher_elsewhere_is_no_reader() -> None:
 def test_a_reader_that_has_gone_costs_nothing_any_more() -> None:
     setup = Setup(1)
     node = desktop(setup.board).node("desk")
-    node.subscription(words, "/a", lambda _: None)
+    node.subscription(OCTETS, "/a", lambda _: None)
     setup.environment.run()
     assert setup.board.topics is not None
     assert setup.board.topics.is_read_elsewhere(setup.writer.key)
@@ -219,22 +212,22 @@ def test_a_reader_that_has_gone_costs_nothing_any_more() -> None:
 
 def test_messages_from_elsewhere_still_come_through_the_stack() -> None:
     setup = Setup(1)
-    publisher = desktop(setup.board).node("desk").publisher(words, "/a")
+    publisher = desktop(setup.board).node("desk").publisher(OCTETS, "/a")
     setup.environment.run()
-    publisher.publish(words.cls(layout=layout, data=np.zeros(U, np.uint8)))
+    publisher.publish(octets(np.zeros(U, np.uint8)))
     setup.environment.run()
     assert setup.times() == {"h0": 50 + U, "s": 50}
 
 
 def test_filter_and_check_hold_for_messages_of_the_board() -> None:
     setup = Setup(0)
-    own = SubscriptionSource(setup.board, setup.node, words, "/a", own=PublisherFilter(setup.writer.gid))
+    own = SubscriptionSource(setup.board, setup.node, OCTETS, "/a", own=PublisherFilter(setup.writer.gid))
     own.open(lambda: None)
 
     def check(_: Any) -> None:
         raise BadMessageError("image_size", "too small")
 
-    strict = SubscriptionSource(setup.board, setup.node, words, "/a")
+    strict = SubscriptionSource(setup.board, setup.node, OCTETS, "/a")
     strict.open(lambda: None, check)
     setup.publish(hardware=False)
     assert (own.is_ready(), strict.is_ready()) == (False, False)
@@ -243,7 +236,7 @@ def test_filter_and_check_hold_for_messages_of_the_board() -> None:
 
 def test_a_reader_that_is_too_slow_keeps_the_last() -> None:
     setup = Setup(0)
-    lazy = SubscriptionSource(setup.board, setup.node, words, "/a")
+    lazy = SubscriptionSource(setup.board, setup.node, OCTETS, "/a")
     lazy.open(lambda: None)
     for _ in range(12):
         setup.publish(hardware=False)
@@ -263,17 +256,17 @@ class Late:
         self.environment = self.board.environment
         self.from_hardware = from_hardware
         node = self.board.context.node("n")
-        self.writer = self.board.writer(node, words, "/a", writer)
+        self.writer = self.board.writer(node, OCTETS, "/a", writer)
         for number in range(5):
             self.publish(number)
             self.environment.run()
-        self.source = SubscriptionSource(self.board, node, words, "/a", reader)
+        self.source = SubscriptionSource(self.board, node, OCTETS, "/a", reader)
         self.started_ns = self.environment.now
         self.got: list[tuple[int, int]] = []
         self.source.open(self.note, in_hardware=to_hardware)
 
     def publish(self, number: int) -> None:
-        body = words.cls(layout=layout, data=np.full(U, number, np.uint8))
+        body = octets(np.full(U, number, np.uint8))
         timeline = Timeline(self.environment, self.environment.now)
         if self.from_hardware:
             Activity(self.writer.publish(body, timeline))

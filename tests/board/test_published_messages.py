@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
+from octets import OCTETS, octets
 from small_board import Tickets, desktop, small_board, small_profile, types
 
 from reconros_zenoh.board.executor import Executor
@@ -21,27 +22,25 @@ if TYPE_CHECKING:
 
 # What is sent waits for the stack, so that there is time to change it.
 PROFILE = small_profile({"a": (100, 100)}, dds_message_ns=1000)
-BYTES = types().message("std_msgs/msg/UInt8MultiArray")
-LAYOUT = types().message("std_msgs/msg/MultiArrayLayout").cls(dim=[], data_offset=0)
 BIG = 100_000
 
 
 @pytest.mark.parametrize("hardware", [True, False])
 def test_a_callback_that_publishes_one_array_again_and_again(hardware: bool) -> None:
     board = small_board(PROFILE, 1)
-    writer = TopicWriter(board, board.context.node("n"), BYTES, "/out")
+    writer = TopicWriter(board, board.context.node("n"), OCTETS, "/out")
     picture = np.zeros(BIG, np.uint8)
 
     def in_slot(thread: HardwareThread) -> Steps:
         for value in (1, 2):
             picture.fill(value)
-            yield from thread.publish(writer, writer.message(layout=LAYOUT, data=picture))
+            yield from thread.publish(writer, octets(picture))
         picture.fill(3)
 
     def in_software(_: object, context: SoftwareContext) -> None:
         for value in (1, 2):
             picture.fill(value)
-            context.publish(writer, writer.message(layout=LAYOUT, data=picture))
+            context.publish(writer, octets(picture))
         picture.fill(3)
 
     executor, source = Executor(board, 1, 1), Tickets(board)
@@ -51,7 +50,7 @@ def test_a_callback_that_publishes_one_array_again_and_again(hardware: bool) -> 
         executor.add_sw_callback("a", CallbackKind.SUB, source, in_software)
     executor.spin()
     got: list[Any] = []
-    desktop(board).node("c").subscription(BYTES, "/out", lambda received: got.append(received.message.data))
+    desktop(board).node("c").subscription(OCTETS, "/out", lambda received: got.append(received.message.data))
     source.put(None)
     board.environment.run(until=1_000_000)
     assert executor.failures == {}

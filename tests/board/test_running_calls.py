@@ -9,12 +9,12 @@ import pytest
 from small_board import Tickets, desktop, small_board, small_profile, types
 
 from reconros_zenoh.board.answers import StatusAnswer
-from reconros_zenoh.board.control import status
 from reconros_zenoh.board.executor import Executor
 from reconros_zenoh.board.hmt import FifoPlan, HmtSource, HmtWriter
 from reconros_zenoh.board.os_resources import Condition, Mailbox, Mutex, Semaphore
 from reconros_zenoh.board.profile import read_profile
 from reconros_zenoh.board.sources import SubscriptionSource, TimerSource
+from reconros_zenoh.board.status import status
 from reconros_zenoh.errors import CallbackError
 from reconros_zenoh.executor.callbacks import CallbackKind
 

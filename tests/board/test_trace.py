@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-import numpy as np
 import pytest
+from octets import OCTETS, sized
 from small_board import BITSTREAM_BYTES, Tickets, ignore, small_board, small_profile, start, types
 
 from reconros_zenoh.board.executor import Executor
@@ -96,13 +96,10 @@ def test_a_call_that_fails_ends_and_one_that_still_runs_lasts_until_now() -> Non
 
 def test_a_gateway_is_in_its_slot_while_it_works_and_not_while_its_request_stands() -> None:
     board = small_board(small_profile(cancel_ns=30), 1, traced=True)
-    octets = types().message("std_msgs/msg/UInt8MultiArray")
-    layout = types().message("std_msgs/msg/MultiArrayLayout").cls(dim=[], data_offset=0)
-    topic = board.hardware_topic("/a", octets)
-    board.add_gateway("bridge", "/a", "/a", octets, 0)
-    message: Any = octets.cls(layout=layout, data=np.zeros(84, np.uint8))
+    topic = board.hardware_topic("/a", OCTETS)
+    board.add_gateway("bridge", "/a", "/a", OCTETS, 0)
     board.environment.run(until=100)
-    start(board.environment, topic.publish("p", message, 100, Timeline(board.environment, 100)))
+    start(board.environment, topic.publish("p", sized(100), 100, Timeline(board.environment, 100)))
     board.environment.run(until=1000)
     assert slices(board) == [Slice("RS0", "bridge", None, 100, 200), Slice("RS0", "bridge", None, 200, 230)]
 

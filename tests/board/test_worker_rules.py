@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from small_board import Log, Tickets, ignore, logging_thread, small_board, small_profile, stages
 
 from reconros_zenoh.board.executor import Executor
+from reconros_zenoh.board.workers import until_poll_ns
 from reconros_zenoh.executor.callbacks import CallbackKind
 
 if TYPE_CHECKING:
@@ -112,8 +113,10 @@ def test_the_wake_up_is_rounded_up_to_the_grid_of_the_idle_worker(poll_ns: int, 
     assert [time_ns for time_ns, what in board.log if what == "a starts"] == expected
 
 
-def test_the_grid_drifts_with_the_root_of_the_polls_that_nobody_counted() -> None:
-    executor = SoftwareBoard(small_profile({"a": (1, 0)}, poll_jitter=0.05)).executor
+@pytest.mark.parametrize(("ready_ns", "begins_ns"), [(4000, 4970), (1970, 1970)])
+def test_the_grid_drifts_with_the_root_of_the_polls_that_nobody_counted(
+    ready_ns: int, begins_ns: int
+) -> None:
     drawn: list[tuple[float, float]] = []
 
     class Script(random.Random):
@@ -121,19 +124,17 @@ def test_the_grid_drifts_with_the_root_of_the_polls_that_nobody_counted() -> Non
             drawn.append((mu, sigma))
             return 30.0
 
-    executor.board.randomness = Script()
-    # Polled at 1030, 2030, ... after it became idle.
-    assert executor.until_poll_ns(1000, 4000) == 1000 - 30
-    assert executor.until_poll_ns(1000, 1970) == 0
-    assert [mu for mu, _ in drawn] == [0, 0]
-    assert [sigma for _, sigma in drawn] == pytest.approx([1000 * 0.05 * 2, 1000 * 0.05 * 1.97**0.5])
+    board = SoftwareBoard(small_profile({"a": (0, 0)}, software_poll_ns=1000, poll_jitter=0.05))
+    board.board.randomness = Script()
+    board.sources["a"].put_at(ready_ns)
+    board.environment.run(until=10_000)
+    assert board.log[0] == (begins_ns, "a starts")  # polled at 970, 1970, ...
+    assert drawn == [(0, pytest.approx(1000 * 0.05 * (ready_ns / 1000) ** 0.5))]
 
 
 @given(st.integers(1, 10**8), st.integers(0, 10**12), st.integers(0, 100))
 def test_a_poll_is_never_more_than_a_period_away(poll_ns: int, idle_ns: int, seed: int) -> None:
-    executor = SoftwareBoard(small_profile({"a": (1, 0)}, poll_jitter=0.3)).executor
-    executor.board.randomness = random.Random(seed)
-    assert 0 <= executor.until_poll_ns(poll_ns, idle_ns) <= poll_ns
+    assert 0 <= until_poll_ns(poll_ns, idle_ns, 0.3, random.Random(seed)) <= poll_ns
 
 
 def test_software_and_hardware_workers_poll_at_their_own_pace() -> None:

@@ -8,13 +8,13 @@ import pytest
 import typer
 
 from reconros_zenoh.cli import demo as command
-from reconros_zenoh.experiments import virtual, wall
+from reconros_zenoh.experiments import roundtrip_virtual, roundtrip_wall
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
-IN_VIRTUAL_TIME = virtual.run_virtual
+IN_VIRTUAL_TIME = roundtrip_virtual.run_virtual
 
 
 def interrupt(*_: object) -> None:
@@ -32,7 +32,7 @@ def interrupt_first_mapping(plan: Any, report: Any, on_progress: Callable[[str, 
 
 @pytest.fixture(autouse=True)
 def _without_processes(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(wall, "run_wall", IN_VIRTUAL_TIME)
+    monkeypatch.setattr(roundtrip_wall, "run_wall", IN_VIRTUAL_TIME)
 
 
 def run_demo(out: Path) -> int:
@@ -44,7 +44,7 @@ def run_demo(out: Path) -> int:
 def test_in_its_second_part(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(virtual, "run_virtual", interrupt_first_mapping)
+    monkeypatch.setattr(roundtrip_virtual, "run_virtual", interrupt_first_mapping)
     assert run_demo(tmp_path) == 130
     *_, report, end = capsys.readouterr().out.splitlines()
     assert (report, end) == (f"report: {tmp_path / 'report.html'}", "interrupted before its end")
@@ -57,7 +57,7 @@ def test_in_its_second_part(
 def test_before_the_second_part_has_measured_anything(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(virtual, "run_virtual", interrupt)
+    monkeypatch.setattr(roundtrip_virtual, "run_virtual", interrupt)
     assert run_demo(tmp_path) == 130
     page = (tmp_path / "report.html").read_text()
     assert "<h2>roundtrip, wall clock</h2>" in page
@@ -78,7 +78,7 @@ def test_while_it_finds_out_what_each_mechanism_is_worth(
 def test_before_anything_was_measured(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(wall, "run_wall", interrupt)
+    monkeypatch.setattr(roundtrip_wall, "run_wall", interrupt)
     assert run_demo(tmp_path) == 130
     assert capsys.readouterr().out.splitlines()[-1] == "interrupted before anything was measured"
     assert not (tmp_path / "report.html").exists()

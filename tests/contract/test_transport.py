@@ -11,10 +11,11 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 import pytest
-from links import as_another_host_does, free_endpoint, slow_link
+from links import as_another_host_does, slow_link
 
 from reconros_zenoh.clock.virtual import VirtualEnvironment
 from reconros_zenoh.errors import TransportError, UsageError
+from reconros_zenoh.experiments.endpoints import free_endpoint
 from reconros_zenoh.ros.qos import Durability, History, QosProfile, Reliability
 from reconros_zenoh.transport import zenoh_session
 from reconros_zenoh.transport.simulated import SimulatedNetwork

@@ -15,12 +15,12 @@ from contextlib import ExitStack
 from typing import TYPE_CHECKING
 
 import pytest
-from links import free_endpoint
 from pages import README, ROOT, blocks, invoke
 from processes import Process, run
 from rosbags.rosbag2 import Writer
 
 from reconros_zenoh.applications.roundtrip.kernels.mnist import MODEL
+from reconros_zenoh.experiments.endpoints import free_endpoint
 from reconros_zenoh.experiments.roundtrip import application_folder
 from reconros_zenoh.ros.type_registry import TypeRegistry
 

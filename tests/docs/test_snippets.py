@@ -16,9 +16,10 @@ from contextlib import ExitStack
 from typing import TYPE_CHECKING
 
 import pytest
-from links import free_endpoint
 from pages import README, ROOT, blocks, invoke
 from processes import Process, run
+
+from reconros_zenoh.experiments.endpoints import free_endpoint
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

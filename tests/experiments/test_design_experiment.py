@@ -20,8 +20,8 @@ from reconros_zenoh.applications.design_example.control.plant import SETPOINT
 from reconros_zenoh.applications.design_example.picture import moving_picture
 from reconros_zenoh.applications.roundtrip.kernels.inverse import inverse_kinematics
 from reconros_zenoh.applications.roundtrip.kernels.sobel import sobel
-from reconros_zenoh.board.control import status
 from reconros_zenoh.board.profile import read_profile
+from reconros_zenoh.board.status import status
 from reconros_zenoh.cli.design import design
 from reconros_zenoh.errors import TransportError, UsageError
 from reconros_zenoh.experiments import design_virtual

@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 from reconros_zenoh.cli import demo, experiment, gateway_experiment, simulate, tables
 from reconros_zenoh.cli.main import _application
 from reconros_zenoh.clock.signals import EndingHandler
-from reconros_zenoh.experiments import ablation, virtual, wall
+from reconros_zenoh.experiments import ablation, roundtrip_virtual, roundtrip_wall
 from reconros_zenoh.experiments.deployment import DeploymentRun
 from reconros_zenoh.experiments.interruption import until_interrupted
 
@@ -95,7 +95,7 @@ def test_it_is_not_marked_interrupted(tmp_path: Path, monkeypatch: pytest.Monkey
 def test_demo_ends_before_its_next_part(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, writing: str
 ) -> None:
-    monkeypatch.setattr(wall, "run_wall", virtual.run_virtual)
+    monkeypatch.setattr(roundtrip_wall, "run_wall", roundtrip_virtual.run_virtual)
     press_ctrl_c_in(monkeypatch, demo, writing)
     result = reconros("demo", "--wall-requests", 3, "--out", tmp_path)
     assert result.exit_code == 130
@@ -110,7 +110,7 @@ def test_demo_ends_before_its_next_part(
 def test_demo_that_has_measured_all_writes_its_report(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(wall, "run_wall", virtual.run_virtual)
+    monkeypatch.setattr(roundtrip_wall, "run_wall", roundtrip_virtual.run_virtual)
     monkeypatch.setattr(ablation, "MECHANISMS", {ablation.COMPLETE: {}})
     monkeypatch.setattr(demo, "_ABLATION_REQUESTS", 3)
     press_ctrl_c_in(monkeypatch, demo, "write_report")

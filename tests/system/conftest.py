@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, NamedTuple
 
 import pytest
-from links import free_endpoint
 from processes import Process
 
+from reconros_zenoh.experiments.endpoints import free_endpoint
 from reconros_zenoh.experiments.roundtrip import application_folder
 from reconros_zenoh.project.loader import load_project
 from reconros_zenoh.transport.zenoh import ZenohTransport

@@ -1,4 +1,4 @@
-"""Endpoints of Zenoh routers: free ones, and ways to reach a router that are not the usual one."""
+"""Ways to reach a Zenoh router that are not the usual one."""
 
 from __future__ import annotations
 
@@ -7,18 +7,12 @@ from contextlib import contextmanager, suppress
 from threading import Event, Thread
 from typing import TYPE_CHECKING
 
-from reconros_zenoh.experiments.wall import free_port
-
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
 _LIMIT_S = 30
 _BYTES_PER_S = 12_500_000
 _BUFFER_BYTES = 65_536  # larger ones take a whole message meanwhile
-
-
-def free_endpoint() -> str:
-    return f"tcp/127.0.0.1:{free_port()}"
 
 
 def as_another_host_does(router: str) -> str:

@@ -7,8 +7,8 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from host_clients.daemon import ClientOptions
-from reconros_zenoh.board.control import status
 from reconros_zenoh.board.profile import read_profile
+from reconros_zenoh.board.status import status
 from reconros_zenoh.experiments.roundtrip import ANSWER_LIMIT_S, CLIENTS, BoardReport, application
 from reconros_zenoh.experiments.simulation import Simulation
 from reconros_zenoh.measure.record import RecordWriter

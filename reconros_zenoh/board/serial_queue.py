@@ -1,4 +1,4 @@
-"""Messages of one endpoint on their way through the board, one after the other."""
+"""Messages on their way through a part of the board, one after the other."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ T = TypeVar("T")
 _log = logging.getLogger(__name__)
 
 
-class Stream(Generic[T]):
+class SerialQueue(Generic[T]):
     """Hands items to a process in order: the next when it is done with the one before.
 
     At most `depth` wait (None: any number); a further one pushes the oldest out (KEEP_LAST). `dropped` counts
     what was pushed out, and the items whose process raised: the first error of a type and place is logged,
-    and the stream goes on. `on_dropped` gets each of them.
+    and the queue goes on. `on_dropped` gets each of them.
     """
 
     def __init__(
@@ -52,14 +52,14 @@ class Stream(Generic[T]):
                 item = self._waiting.popleft()
                 try:
                     yield from self._process(item)
-                except Exception as error:  # noqa: BLE001 - one message must not end the stream
+                except Exception as error:  # noqa: BLE001 - one message must not end the queue
                     self._drop(item)
                     if self._ways_to_fail.is_new(error):
                         _log.exception(
                             "a message was lost on its way through the board; a loss of this kind is not "
                             "reported again"
                         )
-                del item  # the last one is not kept while the stream is idle
+                del item  # the last one is not kept while the queue is idle
             yield PARK
 
     def _drop(self, item: T) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import socket
 import threading
 import uuid
 from contextlib import suppress
@@ -15,6 +14,7 @@ from deploy.runner import LocalRunner
 from deploy.service_run import ServiceState
 from reconros_zenoh.board.control import ask_status
 from reconros_zenoh.errors import TransportError
+from reconros_zenoh.experiments.endpoints import free_endpoint
 from reconros_zenoh.experiments.roundtrip import ANSWER_LIMIT_S, CLIENTS, BoardReport
 from reconros_zenoh.transport.zenoh import ZenohTransport
 
@@ -36,7 +36,7 @@ def run_wall(plan: Plan, report: BoardReport, on_progress: Callable[[str, str], 
     """
     with as_file(files("deploy") / "roundtrip.yaml") as compose:
         for mapping, path in plan.mappings.items():
-            router = f"tcp/127.0.0.1:{free_port()}"
+            router = free_endpoint()
             environment = {
                 **os.environ,
                 "ROUTER": router,
@@ -109,10 +109,3 @@ class _Watch:
             for _ in range(lines - self._seen[client]):
                 self._on_progress(self._mapping, client)
             self._seen[client] = max(lines, 0)
-
-
-def free_port() -> int:
-    """Return a port of the loopback interface that was free just now."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
