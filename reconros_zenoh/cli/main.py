@@ -7,6 +7,7 @@ import json
 import logging
 import signal
 import sys
+import warnings
 from typing import NoReturn
 
 import typer
@@ -55,6 +56,7 @@ def main() -> None:
     open_streams()
     _log_to_stderr()
     logging.getLogger("matplotlib").setLevel(logging.ERROR)  # where its fonts are is nobody's concern
+    warnings.filterwarnings("ignore", "Glyph .* missing from font")  # nor what they lack
     ending = EndingHandler()
     endings = ending_signals()
     for number in endings:
@@ -73,7 +75,7 @@ def main() -> None:
         except OSError as error:
             if error.filename is None:  # the output
                 raise
-            _fail(f"{error.filename}: {error.strerror}", 1)
+            _fail(f"{error.filename}: {error.strerror}. Check the path and its permissions.", 2)
         finally:
             sys.stdout.flush()
     except KeyboardInterrupt:

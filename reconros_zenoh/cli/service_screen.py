@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import itertools
+import os
+import signal
 import threading
 from contextlib import nullcontext
 from typing import TYPE_CHECKING, Self
@@ -69,10 +71,13 @@ class ServiceScreen:
                 self._console.print(f"{service}: {state}")
 
     def _follow(self) -> None:
-        while not self._over.wait(_READ_INTERVAL_S):
-            with self._lock:
-                for service in self._readers:
-                    self._print_new_lines(service, all_of_it=False)
+        try:
+            while not self._over.wait(_READ_INTERVAL_S):
+                with self._lock:
+                    for service in self._readers:
+                        self._print_new_lines(service, all_of_it=False)
+        except SystemExit:  # rich's, where nobody reads our output any more; it would end this thread alone
+            os.kill(os.getpid(), signal.SIGTERM)
 
     def _print_new_lines(self, service: str, *, all_of_it: bool) -> None:
         if service in self._readers:

@@ -10,6 +10,7 @@ import sys
 from contextlib import contextmanager
 from datetime import UTC, datetime
 from importlib.metadata import version
+from tempfile import TemporaryFile
 from typing import TYPE_CHECKING, Any
 
 from reconros_zenoh.errors import UsageError
@@ -55,10 +56,12 @@ def writing(place: Path) -> Iterator[None]:
 def own_folder(folder: Path) -> Iterator[None]:
     """Run the block with a folder that no other experiment writes to at the same time.
 
-    Makes the folder; raises UsageError when that fails, or while another experiment has it.
+    Makes the folder; raises UsageError when that fails, when nothing can be written there, or while another
+    experiment has it.
     """
     with writing(folder):
         folder.mkdir(parents=True, exist_ok=True)
+        TemporaryFile(dir=folder).close()  # now, rather than when the results are there
         descriptor = os.open(folder, os.O_RDONLY)
     try:
         if not lock(descriptor):

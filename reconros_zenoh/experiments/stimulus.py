@@ -103,7 +103,8 @@ def bag_topics(path: Path, known: Mapping[str, str], types: TypeRegistry) -> tup
         with Reader(path) as bag:
             connections, seconds = list(bag.connections), bag.duration / _S
     except (ReaderError, OSError, ValueError, KeyError, TypeError) as error:
-        raise UsageError(f"{path} cannot be read as a rosbag2 recording: {error} Give its folder.") from error
+        told = str(error).removesuffix(".")
+        raise UsageError(f"{path} cannot be read as a rosbag2 recording: {told}. Give its folder.") from error
     for connection in connections:
         if connection.topic in known:
             expected = types.message(known[connection.topic])

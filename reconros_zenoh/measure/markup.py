@@ -89,7 +89,7 @@ def write_page(path: Path, title: str, parts: Iterable[str]) -> None:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with replacing(path) as partial:
-            partial.write_text(page, encoding="utf-8")
+            partial.write_text(page, encoding="utf-8", errors="backslashreplace")  # it quotes a command
     except OSError as error:
         raise UsageError(
             f"{path}: the report cannot be written: {error.strerror}. Choose a folder that you may write to."

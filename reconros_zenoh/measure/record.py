@@ -147,10 +147,13 @@ def find_records(folder: Path) -> list[Path]:
 
 
 def short_names(paths: Sequence[Path]) -> list[str]:
-    """Return `mapping/client` for each record file, with as many folders before it as tell them apart."""
+    """Return `mapping/client` for each record file, with as many folders before it as tell them apart.
+
+    What is not UTF-8 in a path is written out, so that the names can be drawn.
+    """
     parts = [path.absolute().with_suffix("").parts for path in paths]
     for depth in range(2, max(map(len, parts)) + 1):
-        names = ["/".join(part[-depth:]) for part in parts]
+        names = ["/".join(part[-depth:]).encode(errors="backslashreplace").decode() for part in parts]
         if len(set(names)) == len(names):
             return names
     return [str(path) for path in paths]

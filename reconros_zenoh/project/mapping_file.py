@@ -109,6 +109,13 @@ def read_mapping(
     toml = TomlFile.read(path)
     if "name" in toml.content:
         raise FileError(path, toml.line(["name"]), "name: unknown key.", "The file name names the mapping.")
+    if path.stem == ".." or not path.stem.isprintable():
+        raise FileError(
+            path,
+            None,
+            f"{path.stem!r} cannot name a mapping: folders and drawings have its name.",
+            "Rename the file.",
+        )
     one_per_slot = 0 if toml.content.get("executor") == "standard" else len(slots)
     try:
         mapping = ProjectMapping.model_validate(

@@ -158,9 +158,16 @@ def test_a_file_that_nobody_foresaw_is_told_as_other_errors_are(
     monkeypatch.setenv("XDG_STATE_HOME", str(file))
     done = reconros(f"down -f {file} --json")
     told = json.loads(done.stdout)["error"]
-    assert (done.returncode, done.stderr) == (1, f"reconros: {told}\n")
+    assert (done.returncode, done.stderr) == (2, f"reconros: {told}\n")
     assert told.startswith(f"{file}/reconros/")
-    assert told.endswith("/lock: Not a directory")
+    assert told.endswith("/lock: Not a directory. Check the path and its permissions.")
+
+
+def test_letters_that_a_drawing_has_not_leave_no_warning(tmp_path: Path) -> None:
+    record = tmp_path / "\u8a08\u6e2c.csv"
+    record.write_text("1.0\n2.0\n", encoding="utf-8")
+    done = reconros(f"hist {record} --png {tmp_path / 'times.png'}")
+    assert (done.returncode, done.stderr) == (0, "")
 
 
 def test_closed_streams_do_not_matter(tmp_path: Path) -> None:

@@ -145,6 +145,17 @@ def test_ctrl_c_stops_all(services: Services, start: Start, number: signal.Signa
     services.assert_gone()
 
 
+def test_up_ends_when_nobody_reads_what_it_prints(services: Services, start: Start) -> None:
+    talking = "import time\nwhile True:\n    print('x', flush=True)\n    time.sleep(0.01)"
+    services.compose_file(services.service("one", talking))
+    with start("up") as process:
+        assert process.stdout is not None
+        process.stdout.readline()
+        process.stdout.close()
+        assert process.wait() == 130
+    services.assert_gone()
+
+
 def test_down_stops_what_up_has_left_running(services: Services, run: Run) -> None:
     _server_and(services, "block()")
     up = run("up", "-d")

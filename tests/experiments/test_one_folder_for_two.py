@@ -45,3 +45,9 @@ def test_the_folder_is_free_again(tmp_path: Path) -> None:
         own_folder(tmp_path / "new").__enter__()
     with own_folder(tmp_path / "new"):
         pass
+
+
+def test_a_folder_in_which_nothing_can_be_written_is_refused_before_anything_is_measured() -> None:
+    """Of /proc that holds for root, too."""
+    with pytest.raises(UsageError, match=r"/proc cannot be written \(.*\)\. Choose another --out\."):
+        own_folder(Path("/proc")).__enter__()

@@ -91,6 +91,12 @@ def test_the_histograms_are_drawn(folder, tmp_path):
     assert (tmp_path / "h.png").read_bytes().startswith(b"\x89PNG")
 
 
+def test_a_name_that_is_not_utf_8_is_drawn(folder, tmp_path):
+    record = folder / "mixed" / "\udcff.csv"
+    (folder / "mixed" / "sort.csv").rename(record)
+    assert "mixed/\\udcff" in run(record, "--png", tmp_path / "a.png")
+
+
 def test_what_cannot_be_shown_is_an_error(folder, tmp_path):
     (tmp_path / "none").mkdir()
     with pytest.raises(UsageError, match="no record found"):

@@ -155,6 +155,12 @@ def test_names_are_text_never_markup(tmp_path):
     assert 'src="x"' not in html
 
 
+def test_a_command_that_is_not_utf_8_is_quoted(tmp_path):
+    records = {"mine": {"x": Record("x", np.array([1.0, 2.0]))}}
+    experiment = experiment_of(records, command="demo --out \udcff")
+    assert "demo --out \\udcff" in Page(written(tmp_path / "r.html", (experiment, records))).text
+
+
 def test_a_run_that_was_stopped_at_once_still_has_a_report(tmp_path):
     records = {"mixed": {}}
     text = Page(written(tmp_path / "r.html", (experiment_of(records, spans=records), records))).text

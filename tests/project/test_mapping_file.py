@@ -45,6 +45,14 @@ def test_a_mapping(tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.parametrize("name", ["..", "a\nb", "\x1b[31m", "\udcff"])
+def test_a_mapping_has_a_name_for_folders_and_drawings(name: str, tmp_path: Path) -> None:
+    path = tmp_path / f"{name}.toml"
+    path.write_text(GOOD, encoding="utf-8")
+    with pytest.raises(FileError, match="cannot name a mapping"):
+        read_mapping(path, {"sobel": (2, 3), "hash": (3,)}, (2, 3))
+
+
 def test_hardware_workers(tmp_path: Path) -> None:
     one_slot = GOOD.replace("slots = [2, 3]", "slots = [2]").replace("slots = [3]\n", "")
     assert read(tmp_path, "hardware_workers = 1\n" + one_slot).hardware_workers == 1
