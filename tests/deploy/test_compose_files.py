@@ -301,9 +301,10 @@ def test_shipped_files_need_no_variables(path: Path) -> None:
     assert read_compose(path, {}).services
 
 
-def test_variables_for_containers_reach_every_process() -> None:
+@pytest.mark.parametrize("path", sorted(SHIPPED.glob("*.yaml")), ids=lambda path: path.name)
+def test_variables_for_containers_reach_every_process(path: Path) -> None:
     lines = (SHIPPED / "containers.env").read_text().splitlines()
     environment = dict(line.split("=", 1) for line in lines if not line.startswith("#"))
-    services = read_compose(SHIPPED / "roundtrip.yaml", environment).services
+    services = read_compose(path, environment).services
     assert {service.environment["RECONROS_ROUTER"] for service in services.values()} == {"tcp/router:7447"}
     assert not [s for s in services.values() if "127.0.0.1" in " ".join(s.command)]
