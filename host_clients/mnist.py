@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 class MnistExchange(TopicExchange):
     """An image of a digit out, its class back.
 
-    The right answer is what the shipped network says, not the label: the network errs in about one of a
+    The right answer is what the shipped network says, not the label: the network errs in one of two
     hundred.
     """
 

@@ -99,7 +99,7 @@ def compare(
         seconds = seconds or length_s
         runs: dict[str, MappingRun] = {}
         with (
-            run_bar("compare", len(mappings), quiet=as_json, each="mappings") as advance,
+            run_bar("compare", len(mappings), quiet=as_json, each="mapping") as advance,
             until_interrupted() as interruption,
         ):
             for name, mapped in mappings.items():

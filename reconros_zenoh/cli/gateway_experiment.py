@@ -51,7 +51,7 @@ def gateway(
     real processes, publisher and subscriber in software.
     """
     from reconros_zenoh.board.profile import read_profile
-    from reconros_zenoh.experiments.gateway import measure_gateway
+    from reconros_zenoh.experiments.gateway import check_profile, measure_gateway
     from reconros_zenoh.experiments.gateway_native import measure_native
 
     byte_counts, counts = _sizes(sizes), _counts(subscribers)
@@ -62,6 +62,8 @@ def gateway(
         if clock is ClockName.VIRTUAL or publisher is Side.HARDWARE:
             raise UsageError("profile native runs in real time, with the publisher in software.")
         publishers = [Side.SOFTWARE]
+    else:
+        check_profile(board)
     with own_folder(out):
         _prepare(out)
         with run_bar("cells", len(publishers) * len(byte_counts) * len(counts), quiet=as_json) as advance:

@@ -54,11 +54,11 @@ class ExperimentProgress:
 
 
 @contextmanager
-def run_bar(what: str, runs: int, *, quiet: bool, each: str = "runs") -> Iterator[Callable[[], None]]:
+def run_bar(what: str, runs: int, *, quiet: bool, each: str = "run") -> Iterator[Callable[[], None]]:
     """Show how many of the runs are done while the block runs; it calls what it is given after each."""
     console = PlainConsole(stderr=True, quiet=quiet)
     if not console.is_interactive:
-        console.print(f"{what}: {runs} {each} ...")
+        console.print(f"{what}: {runs} {each}{'s' * (runs != 1)} ...")
     with _bars(console) as bars:
         yield partial(bars.advance, bars.add_task(what, total=runs))
 

@@ -72,7 +72,7 @@ def simulate(
         run = DeploymentRun([plan] if boards is None else [plan.clone(number) for number in range(boards)])
         with (
             run_bar(
-                "virtual time", run.requests, quiet=as_json or not run.requests, each="requests"
+                "virtual time", run.requests, quiet=as_json or not run.requests, each="request"
             ) as advance,
             until_interrupted() as interruption,
         ):

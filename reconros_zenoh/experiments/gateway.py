@@ -77,6 +77,15 @@ class Cell:
         return self.smt.sw_ms / self.gateway.sw_ms
 
 
+def check_profile(profile: Profile) -> None:
+    """Raise UsageError for a profile without the times of topics inside a board."""
+    if profile.model is None or profile.model.topics is None:
+        raise UsageError(
+            f"profile {profile.name!r} does not know what topics inside a board cost. Use --profile zcu104, "
+            "or native to measure this host."
+        )
+
+
 def measure_gateway(
     clock: Clock,
     profile: Profile,
@@ -91,11 +100,6 @@ def measure_gateway(
     `on_cell` is called after each. Ctrl-C keeps the cells that are complete. Raise ExperimentError when a
     subscriber got something wrong or nothing.
     """
-    if profile.model is None or profile.model.topics is None:
-        raise UsageError(
-            f"profile {profile.name!r} does not know what topics inside a board cost. Use --profile zcu104, "
-            "or native to measure this host."
-        )
     sizes = list(sizes)
     bodies = {size: random_body(size) for size in sizes}
     cells: list[Cell] = []

@@ -74,13 +74,14 @@ class BoardReport:
     statuses: dict[str, Mapping[str, Any]] = field(default_factory=dict)
 
     def host(self) -> dict[str, Any]:
-        """Return the overruns of all mappings together and the worst lag, None where no board told them."""
+        """Return the overruns of all mappings together, else the worst, None where no board told it."""
         hosts = [status["host"] for status in self.statuses.values()]
+        worst = {"lag_p50_us": max, "lag_p99_us": max, "real_time_priority": min}
         return {
             **host(sum(each["overruns"] for each in hosts) if hosts else None),
             **{
-                key: max((each[key] for each in hosts if each[key] is not None), default=None)
-                for key in ("lag_p50_us", "lag_p99_us")
+                key: of((each[key] for each in hosts if each[key] is not None), default=None)
+                for key, of in worst.items()
             },
         }
 

@@ -51,18 +51,21 @@ def test_what_cannot_redraw_gets_lines(kind: str, monkeypatch: pytest.MonkeyPatc
         assert shown.splitlines() == lines
 
 
+@pytest.mark.parametrize(("runs", "each"), [(1, "1 request"), (2, "2 requests")])
 @kinds
-def test_what_cannot_redraw_gets_a_line_for_a_row_of_runs(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_cannot_redraw_gets_a_line_for_a_row_of_runs(
+    kind: str, runs: int, each: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     stderr = stderr_of(kind, monkeypatch)
-    with run_bar("virtual time", 2, quiet=False, each="requests") as advance:
-        advance()
-        advance()
+    with run_bar("virtual time", runs, quiet=False, each="request") as advance:
+        for _ in range(runs):
+            advance()
     shown = stderr.getvalue()
     if kind == "xterm":
         assert BAR in shown
         assert "..." not in shown
     else:
-        assert shown == "virtual time: 2 requests ...\n"
+        assert shown == f"virtual time: {each} ...\n"
 
 
 def test_what_is_quiet_says_nothing(monkeypatch: pytest.MonkeyPatch) -> None:

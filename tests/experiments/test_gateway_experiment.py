@@ -117,13 +117,17 @@ def test_a_wrong_body_ends_the_experiment(monkeypatch: pytest.MonkeyPatch) -> No
         gateway._run("virtual", read_profile("zcu104"), "smt", Side.HARDWARE, 2, random_body(100), 1)
 
 
-def test_a_profile_without_topics_is_refused() -> None:
-    with pytest.raises(UsageError, match="does not know what topics inside a board cost"):
-        measure_gateway("virtual", read_profile("miniitx-zynq7100"), Side, [10], [2], 1, lambda: None)
-
-
 def run(*arguments: str) -> Any:
     return CliRunner().invoke(app, ["gateway", "--repeat", "1", *arguments])
+
+
+def test_a_profile_without_topics_is_refused_and_an_earlier_result_is_kept(tmp_path) -> None:
+    earlier = tmp_path / "gateway.json"
+    earlier.write_text("{}")
+    result = run("--profile", "miniitx-zynq7100", "--out", str(tmp_path))
+    assert isinstance(result.exception, UsageError)
+    assert "does not know what topics inside a board cost" in str(result.exception)
+    assert earlier.read_text() == "{}"
 
 
 def test_the_command_prints_one_json_object_and_draws(tmp_path) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
@@ -49,6 +49,21 @@ def test_what_models_no_board_is_not_compared_with_one(tmp_path: Path, profile: 
     assert (cell["median_error"] is None) == (cells == 0)
     assert experiment["accuracy"]["cells"] == cells
     assert ("a profile that models a board" in accuracy_sentence(experiment["accuracy"])) == (cells == 0)
+
+
+def test_of_several_boards_the_worst_figures_of_the_host_are_told() -> None:
+    def status(overruns: int, lag_us: float | None, priority: bool | None) -> dict[str, Any]:
+        lag = dict.fromkeys(("lag_p50_us", "lag_p99_us"), lag_us)
+        return {"host": {"overruns": overruns, **lag, "real_time_priority": priority}}
+
+    def told(*statuses: dict[str, Any]) -> list[Any]:
+        host = BoardReport({str(number): each for number, each in enumerate(statuses)}).host()
+        return [host[key] for key in ("overruns", "lag_p50_us", "lag_p99_us", "real_time_priority")]
+
+    assert told() == [None, None, None, None]
+    assert told(status(0, None, None)) == [0, None, None, None]
+    assert told(status(1, 90.0, True), status(2, 20.0, True)) == [3, 90.0, 90.0, True]
+    assert told(status(1, 20.0, True), status(2, 90.0, False)) == [3, 90.0, 90.0, False]
 
 
 @pytest.mark.parametrize("clock", ClockName)

@@ -45,7 +45,7 @@ CELL_KEYS = {
     ),
     *("reference_median_ms", "median_error"),
 }
-HOST_KEYS = {"overruns", "lag_p50_us", "lag_p99_us"}
+HOST_KEYS = {"overruns", "lag_p50_us", "lag_p99_us", "real_time_priority"}
 ROUND_TRIP = ("experiment", "roundtrip")
 ENDLESS = "--requests=1000000"
 both_signals = pytest.mark.parametrize("number", [SIGINT, SIGTERM], ids=lambda number: number.name)

@@ -1,1 +1,1 @@
-"""Training of the round trip's digit classifier: needs the extra `training`, never used at run time."""
+"""Training of the round trip's digit classifier: needs what `train` says, never used at run time."""

@@ -43,8 +43,7 @@ def read_digits() -> tuple[Digits, Digits]:
     The package holds float32 rows of 784 values from 0 to 1: the bytes of MNIST, divided by 256.
     """
     file = resources.files("mnist") / "data" / "mnist.pkl.gz"
-    stream = gzip.GzipFile(fileobj=file.open("rb"))
-    with stream:
+    with file.open("rb") as packed, gzip.GzipFile(fileobj=packed) as stream:
         sets = NumpyUnpickler(stream, encoding="latin1").load()
     train, validation, test = (
         Digits(np.rint(rows * 256).astype(np.uint8).reshape(-1, 28, 28), labels.astype(np.uint8))

