@@ -88,7 +88,6 @@ def _prepare(out: Path) -> None:
     with writing(out):
         for name in (_RESULT, *_FIGURES.values()):
             (out / name).unlink(missing_ok=True)
-        (out / _RESULT).touch()  # who cannot write shall hear of it before he measures
 
 
 def _write(out: Path, result: dict[str, Any]) -> list[Path]:

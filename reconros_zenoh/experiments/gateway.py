@@ -15,7 +15,7 @@ from reconros_zenoh.clock.virtual import VirtualEnvironment, succeed_once
 from reconros_zenoh.clock.wall import WallEnvironment
 from reconros_zenoh.errors import ExperimentError, UsageError
 from reconros_zenoh.experiments.interruption import until_interrupted
-from reconros_zenoh.experiments.provenance import host
+from reconros_zenoh.experiments.provenance import host, provenance
 from reconros_zenoh.mapping.graph import Side
 from reconros_zenoh.project.hosting import BoardOptions, HostedBoard
 from reconros_zenoh.project.loader import load_project
@@ -122,6 +122,7 @@ def measure_gateway(
         "anchors": anchors(cells),
         "host": host(overruns),
         "interrupted": interruption.happened,
+        **provenance(),
     }
 
 

@@ -21,7 +21,7 @@ from reconros_zenoh.experiments.gateway import Cell, Times, Variant
 from reconros_zenoh.experiments.gateway_processes import run_board, run_listener, run_publisher
 from reconros_zenoh.experiments.interruption import until_interrupted
 from reconros_zenoh.experiments.processes import Processes, receive, send
-from reconros_zenoh.experiments.provenance import host
+from reconros_zenoh.experiments.provenance import host, provenance
 from reconros_zenoh.mapping.graph import Side
 from reconros_zenoh.transport.zenoh import ZenohRouter
 from reconros_zenoh.transport.zenoh_session import has_shared_memory
@@ -96,6 +96,7 @@ def measure_native(
         "copies": copies(),
         "host": host(0),
         "interrupted": interruption.happened,
+        **provenance(),
     }
 
 

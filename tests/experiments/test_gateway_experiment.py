@@ -140,6 +140,7 @@ def test_the_command_prints_one_json_object_and_draws(tmp_path) -> None:
     cell = printed["cells"][0]
     assert set(cell) == {"publisher", "size", "subscribers", "smt", "gateway", "speedup_hw", "speedup_sw"}
     assert set(cell["smt"]) == set(cell["gateway"]) == {"hw_max_ms", "sw_ms", "lost"}
+    assert {"date", "command", "versions"} <= set(printed)
     assert json.loads((tmp_path / "gateway.json").read_text()) == printed
     assert {path.name for path in tmp_path.glob("*.png")} == {
         "fig6_hardware_publisher.png",
