@@ -152,30 +152,33 @@ class Parameters:
         return self._parameters[name]
 
     def _message(self, name: str) -> Any:
-        """Return the value as it is sent; that of no parameter says that it is not set."""
+        """Return the value as it is sent."""
         message = zero_message(self._value_type)
-        if name in self._parameters:
-            value: Any = self._parameters[name].value
-            message.type, field = self._parameters[name].kind
-            empty = getattr(message, field)
-            if isinstance(empty, np.ndarray):
-                value = np.array(list(value), empty.dtype)
-            setattr(message, field, value)
+        value: Any = self._parameters[name].value
+        message.type, field = self._parameters[name].kind
+        empty = getattr(message, field)
+        if isinstance(empty, np.ndarray):
+            value = np.array(list(value), empty.dtype)
+        setattr(message, field, value)
         return message
 
+    def _asked(self, request: Any) -> list[str]:
+        """Return the names in the request, none if one is not declared, as rclpy answers."""
+        return request.names if self._parameters.keys() >= set(request.names) else []
+
     def _describe(self, request: Any, response: Any) -> None:
-        for name in request.names:
+        for name in self._asked(request):
             descriptor = zero_message(self._descriptor_type)
-            descriptor.name, descriptor.type = name, self._message(name).type
-            if name in self._parameters:
-                descriptor.description = self._parameters[name].description
+            descriptor.name, descriptor.type = name, self._parameters[name].kind[0]
+            descriptor.description = self._parameters[name].description
             response.descriptors.append(descriptor)
 
     def _get(self, request: Any, response: Any) -> None:
-        response.values = [self._message(name) for name in request.names]
+        response.values = [self._message(name) for name in self._asked(request)]
 
     def _types(self, request: Any, response: Any) -> None:
-        response.types = np.array([self._message(name).type for name in request.names], np.uint8)
+        kinds = [self._parameters[name].kind[0] for name in self._asked(request)]
+        response.types = np.array(kinds, np.uint8)
 
     def _list(self, request: Any, response: Any) -> None:
         # Another thread may declare one meanwhile.

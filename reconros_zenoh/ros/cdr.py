@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from rosbags.typesys.store import Typestore
 
 Encode: TypeAlias = "Callable[[object], tuple[bytes, np.ndarray[Any, Any] | None]]"
-Decode: TypeAlias = "Callable[[bytes | memoryview], tuple[Any, int]]"
+Decode: TypeAlias = "Callable[[bytes | memoryview], Any]"
 
 ENCODE_ERRORS = (AttributeError, TypeError, ValueError, OverflowError, struct.error)
 DECODE_ERRORS = (ValueError, IndexError, struct.error)
@@ -47,7 +47,7 @@ def encoder(store: Typestore, type_name: str) -> Encode:
 
 
 def decoder(store: Typestore, type_name: str) -> Decode:
-    """Return a function from a payload to the message and the position of its end.
+    """Return a function from a payload to the message.
 
     Arrays of numbers are views of the payload; the encapsulation is not looked at. It raises one of
     DECODE_ERRORS when something does not fit into the payload, UnicodeDecodeError for strings that are not
@@ -157,7 +157,7 @@ class _Decoder(Generator[str]):
         self._run.append(Number(f"{len(ENCAPSULATION)}x", 1, None))
         message = self._message(Field("", ""), type_name)
         self._end_run()
-        self._write(f"return {message}, at")
+        self._write(f"return {message}")
 
     def _pack(self, values: list[str], structures: dict[int, struct.Struct]) -> None:
         unpack = self._chosen(structures, lambda structure: (structure.unpack_from, structure.size))

@@ -2,25 +2,18 @@
 
 from __future__ import annotations
 
-import math
-import re
 from typing import TYPE_CHECKING
 
-import numpy as np
 from rosbags.interfaces import Nodetype
-from rosbags.typesys import TypesysError, get_types_from_msg
 
 from reconros_zenoh.errors import FileError, UsageError
+from reconros_zenoh.ros.definition_lines import SMALL_NAME, TYPE_NAME, Field, LineError, definition_line
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from rosbags.interfaces.typing import Constdefs, Fielddefs, FieldDesc, Typesdict
 
-_NAME = re.compile(r"(?!.*__)(?!.*_/)([a-z][a-z0-9_]*)/(msg|srv|action)/([A-Z][A-Za-z0-9]*)")
-_WIDE_STRING = re.compile(r"\s*wstring\b")
-_SIZE_BELOW_ONE = re.compile(r"\s*[^\s#]*(\[|<=)(-|\+?0+\b)")
-_ASSIGNMENT = re.compile(r"\s*\S+\s+\w+\s*=")
 _EVENT_INFO = "service_msgs/msg/ServiceEventInfo"
 _GOAL_ID: tuple[str, FieldDesc] = ("goal_id", (Nodetype.NAME, "unique_identifier_msgs/msg/UUID"))
 _STAMP: FieldDesc = (Nodetype.NAME, "builtin_interfaces/msg/Time")
@@ -100,13 +93,14 @@ def char_as_uint8(description: FieldDesc) -> FieldDesc:
 
 
 def _package(name: str, kind: str) -> str:
-    match = _NAME.fullmatch(name)
-    if match is None or match[2] != kind:
+    package, _, rest = name.partition("/")
+    its_kind, _, type_name = rest.partition("/")
+    if its_kind != kind or not SMALL_NAME.fullmatch(package) or not TYPE_NAME.fullmatch(type_name):
         raise UsageError(
             f"{name!r} cannot be the name of a type. Write package/{kind}/Type, the package in small letters "
             "and the type in CamelCase without '_'."
         )
-    return match[1]
+    return package
 
 
 def _service(name: str) -> Typesdict:
@@ -136,7 +130,7 @@ def _parts(name: str, kind: str, text: str, parts: Sequence[str]) -> Typesdict:
     """Return the definitions of the parts of a text, which lines `---` divide."""
     package = _package(name, kind)
     lines = text.splitlines()
-    separators = [number for number, line in enumerate(lines) if line.strip() == "---"]
+    separators = [number for number, line in enumerate(lines) if line == "---"]
     wanted = len(parts) - 1
     if len(separators) != wanted:
         raise FileError(
@@ -158,55 +152,19 @@ def _definition(
 ) -> tuple[Constdefs, Fielddefs]:
     constants: Constdefs = []
     fields: Fielddefs = []
+    names = set()
     for number, line in enumerate(lines, first_number):
-        if not line.strip():
-            continue
-        if _WIDE_STRING.match(line):
-            raise FileError(name, number, "wstring is not supported.", "Use string, which holds UTF-8.")
-        if _SIZE_BELOW_ONE.match(line):  # rosbags takes a bound of 0 for none
-            raise FileError(name, number, "a size or bound is below 1.", "Write [] for as many as there are.")
         try:
-            more_constants, more_fields = _parsed(package, line)
-        except (TypesysError, AssertionError, ValueError):  # the last for a number of thousands of digits
-            raise FileError(
-                name,
-                number,
-                f"{line.strip()!r} is neither a field, a constant nor a comment.",
-                "Write for example 'uint32[] data' or 'uint8 RED=1'.",
-            ) from None
-        for constant, kind, value in more_constants:
-            try:
-                constants.append((constant, kind, _constant_value(kind, value, line)))
-            except ValueError:
-                raise FileError(
-                    name,
-                    number,
-                    f"{value!r} is no value of the constant {constant}.",
-                    f"Give it one of its type, {kind}.",
-                ) from None
-        fields += [(field, char_as_uint8(description)) for field, description in more_fields]
+            defined = definition_line(package, line)
+        except LineError as error:
+            raise FileError(name, number, *error.args) from None
+        if defined is None:
+            continue
+        if defined.name in names:
+            raise FileError(name, number, f"The name {defined.name} stands twice.", "Rename one of them.")
+        names.add(defined.name)
+        if isinstance(defined, Field):
+            fields.append((defined.name, defined.form))
+        else:
+            constants.append((defined.name, defined.kind, defined.value))
     return constants, fields
-
-
-def _parsed(package: str, line: str) -> tuple[Constdefs, Fielddefs]:
-    """Return the constants and fields of a line; raise what rosbags raises, ValueError for no constant."""
-    # rosbags takes the names of messages only; the name says where `Type` without package is.
-    ((constants, fields),) = get_types_from_msg(line, f"{package}/msg/Line").values()
-    if fields and _ASSIGNMENT.match(line):
-        raise ValueError(line)  # rosbags takes what it cannot read behind the `=` for a default
-    return constants, fields
-
-
-def _constant_value(kind: str, value: str | float, line: str) -> str | float:
-    """Return the value that rosbags reads in the line of a constant as one of its type, else ValueError."""
-    if kind == "string":  # rosbags has numbers where they look like that
-        return value if isinstance(value, str) else line.split("=", 1)[1].split("#", 1)[0].strip()
-    if kind in {"float32", "float64"}:
-        if not math.isfinite(float(value)):
-            raise ValueError(value)
-        return float(value)
-    limits = np.iinfo("uint8" if kind in {"byte", "char"} else kind) if kind != "bool" else None
-    least, most = (limits.min, limits.max) if limits else (0, 1)
-    if not isinstance(value, int) or not least <= value <= most:
-        raise ValueError(value)
-    return int(value) if limits else bool(value)

@@ -63,7 +63,7 @@ def check_topic_name(name: str) -> None:
     """Raise UsageError, with the reason, unless `name` may be given to a topic or service.
 
     The rules are those of `rcl_validate_topic_name` and `rmw_validate_full_topic_name`; substitutions in
-    curly braces are not supported.
+    curly braces are not supported, nor `~a`, of which rcl makes `/nodea`.
     """
     what = "topic or service"
     _require(name != "", what, name, "is empty")

@@ -145,9 +145,10 @@ class MessageType:
     def decode(self, payload: bytes | memoryview) -> Any:
         """Return the message that `payload` encodes; its arrays of numbers are views of `payload`.
 
-        Raises BadMessageError `truncated` when the bytes end too early or too late, or a string or array
-        in them does, and `foreign_encoding` for another encapsulation than CDR little endian and for
-        strings that are not UTF-8.
+        What follows the message is not looked at, as in ROS 2, whose `rmw_serialize` gives as many bytes
+        as a message takes at most. Raises BadMessageError `truncated` when the bytes end too early or a
+        string or array in them does not end rightly, and `foreign_encoding` for another encapsulation than
+        CDR little endian and for strings that are not UTF-8.
         """
         if len(payload) < len(ENCAPSULATION):
             raise BadMessageError(
@@ -161,19 +162,13 @@ class MessageType:
                 f"{self.name}: encapsulation {encapsulation:04x} ({kind}), not 0001 (CDR little endian)",
             )
         try:
-            message, end = self._decode(payload)
+            return self._decode(payload)
         except UnicodeDecodeError as error:
             raise BadMessageError(
                 "foreign_encoding", f"{self.name}: a string is not UTF-8: {error}"
             ) from error
         except DECODE_ERRORS as error:
             raise BadMessageError("truncated", f"{self.name}, {len(payload)} bytes: {error}") from error
-        # Some DDS implementations fill the last word of a payload.
-        if len(payload) > end + -end % 4:
-            raise BadMessageError(
-                "truncated", f"{self.name}: the message ends after {end} of {len(payload)} bytes"
-            )
-        return message
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -22,7 +22,7 @@ float64[<=3] bounded
 string<=10[4] names
 geometry_msgs/Point place
 Colour colour
-wstring text "a=b"
+string text "a"
 int32 x 5
 """
 
@@ -69,15 +69,15 @@ MISTAKES = {
     "double underscore": ("T.msg", "uint32 a__b\n", 1, "no name of a field"),
     "trailing underscore": ("T.msg", "uint32 a_\n", 1, "no name of a field"),
     "small constant": ("T.msg", "uint32 red=1\n", 1, "no name of a constant"),
-    "constant without a value": ("T.msg", "uint32 RED=\n", 1, "is no constant"),
-    "constant array": ("T.msg", "uint32[] RED=1\n", 1, "is no constant"),
-    "constant of a message type": ("T.msg", "Point RED=1\n", 1, "is no constant"),
+    "constant without a value": ("T.msg", "uint32 RED=\n", 1, "no value of the constant"),
+    "constant array": ("T.msg", "uint32[] RED=1\n", 1, "'uint32[]' is no type of a constant"),
+    "constant of a message type": ("T.msg", "Point RED=1\n", 1, "no type of a constant"),
     "name twice": ("T.msg", "uint32 a\nint8 a\n", 2, "stands twice"),
-    "separator in a message": ("T.msg", "uint32 a\n---\n", 2, "many lines `---`"),
-    "service in one part": ("T.srv", "uint32 a\n", None, "few lines `---`"),
-    "service in three parts": ("T.srv", "---\n---\n", 2, "many lines `---`"),
-    "action in two parts": ("T.action", "---\n", None, "few lines `---`"),
-    "action in four parts": ("T.action", "---\n---\n---\n", 3, "many lines `---`"),
+    "separator in a message": ("T.msg", "uint32 a\n---\n", 2, "neither a field"),
+    "service in one part": ("T.srv", "uint32 a\n", None, "has 0 lines '---'"),
+    "service in three parts": ("T.srv", "---\n---\n", 2, "has 2 lines '---'"),
+    "action in two parts": ("T.action", "---\n", None, "has 1 lines '---'"),
+    "action in four parts": ("T.action", "---\n---\n---\n", 3, "has 3 lines '---'"),
 }
 
 
@@ -114,10 +114,10 @@ def test_a_file_with_a_wrong_place_or_name(tmp_path: Path, name: str, problem: s
 @pytest.mark.parametrize(
     ("name", "text", "line", "said"),
     [
-        ("a/msg/T.msg", "uint8 x\nPoint p  # of whom\n", 2, "'a/Point' is not known"),
+        ("a/msg/T.msg", "uint8 x\nPoint p  # of whom\n", 2, "'a/msg/Point' is not known"),
         ("a/msg/T.msg", "\ngeometry_msgs/Pint[3] p\n", 2, "geometry_msgs/msg/Point"),
-        ("a/srv/T.srv", "b/U x\n---\n", 1, "'b/U' is not known"),
-        ("a/action/T.action", "---\n---\nuint8 x\nb/U[<=4] y\n", 4, "'b/U' is not known"),
+        ("a/srv/T.srv", "b/U x\n---\n", 1, "'b/msg/U' is not known"),
+        ("a/action/T.action", "---\n---\nuint8 x\nb/U[<=4] y\n", 4, "'b/msg/U' is not known"),
         ("a/msg/T.msg", "T[] children\n", 1, "contains a/msg/T itself"),
     ],
 )

@@ -13,6 +13,7 @@ from reconros_zenoh.rmw import parameters as parameters_module
 from reconros_zenoh.rmw.parameters import Parameters
 from reconros_zenoh.ros.graph import EndpointKind, EndpointToken, parse
 from reconros_zenoh.ros.qos import QosProfile
+from reconros_zenoh.ros.zero_message import zero_message
 
 VALUES: dict[str, Any] = {
     "flag": True,
@@ -66,18 +67,26 @@ def remote() -> Remote:
 
 
 def test_values_and_their_types(remote: Remote) -> None:
-    names = [*VALUES, "nothing"]
+    names = list(VALUES)
     values = remote.ask("GetParameters", names=names).values
-    assert [value.type for value in values] == [*KINDS, 0]
+    assert [value.type for value in values] == KINDS
     assert values[0].bool_value is True
     assert values[1].integer_value == 3
     assert values[4].string_value == "left"
     assert values[5].byte_array_value.tolist() == [1, 2]
     assert values[6].bool_array_value.tolist() == [True, False]
     assert values[9].string_array_value == ["a", "b"]
-    assert remote.ask("GetParameterTypes", names=names).types.tolist() == [*KINDS, 0]
+    assert remote.ask("GetParameterTypes", names=names).types.tolist() == KINDS
     described = remote.ask("DescribeParameters", names=names).descriptors
     assert [(d.name, d.type, d.description) for d in described[:1]] == [("flag", 1, "the flag")]
+
+
+def test_nothing_is_answered_when_one_of_the_names_is_not_declared(remote: Remote) -> None:
+    # as a node of rclpy 9.1.2 (ROS 2 Kilted) answers
+    names = ["flag", "nothing", "count"]
+    assert remote.ask("GetParameters", names=names).values == []
+    assert remote.ask("GetParameterTypes", names=names).types.tolist() == []
+    assert remote.ask("DescribeParameters", names=names).descriptors == []
 
 
 @pytest.mark.parametrize(
@@ -182,8 +191,8 @@ def test_a_callback_that_changes_parameters_itself_refuses_the_value() -> None:
 
 
 def test_what_cannot_be_unset(remote: Remote) -> None:
-    parameter = types().message("rcl_interfaces/msg/Parameter").cls
-    unset = parameter(name="count", value=remote.parameters._message("nothing"))
+    unset = zero_message(types().message("rcl_interfaces/msg/Parameter"))
+    unset.name = "count"
     assert not remote.ask("SetParameters", parameters=[unset]).results[0].successful
 
 

@@ -149,7 +149,7 @@ def test_an_action_has_two_separators(registry: TypeRegistry, text: str, line: i
     assert caught.value.line == line
 
 
-@pytest.mark.parametrize("text", ["uint8 a\nwstring b", "uint8 a\n wstring<=4[] b", "uint8 a\nwstring B=x"])
+@pytest.mark.parametrize("text", ["uint8 a\nwstring b", "uint8 a\nwstring<=4[] b", "uint8 a\nwstring B=x"])
 def test_wide_strings_are_refused(registry: TypeRegistry, text: str) -> None:
     with pytest.raises(FileError, match="wstring is not supported") as caught:
         registry.add_message("lab_msgs/msg/Wide", text)

@@ -202,14 +202,11 @@ def test_every_truncation_is_refused(typed: tuple[MessageType, Any], data: st.Da
 
 
 @properties
-@given(typed_messages, st.integers(1, 9))
-def test_only_padding_may_follow_a_message(typed: tuple[MessageType, Any], surplus: int) -> None:
+@given(typed_messages, st.binary(max_size=40))
+def test_what_follows_a_message_is_not_looked_at(typed: tuple[MessageType, Any], surplus: bytes) -> None:
     kind, message = typed
     payload = b"".join(kind.encode(message))
-    if surplus <= -len(payload) % 4:
-        assert b"".join(kind.encode(kind.decode(payload + bytes(surplus)))) == payload
-    else:
-        assert refused(kind, payload + bytes(surplus)).reason == "truncated"
+    assert b"".join(kind.encode(kind.decode(payload + surplus))) == payload
 
 
 @properties
