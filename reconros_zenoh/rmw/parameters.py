@@ -98,6 +98,8 @@ class Parameters:
         any other exception that it raises becomes one. It cannot declare or set parameters itself, which
         raises one.
         """
+        if not name or not isinstance(name, str):
+            raise UsageError(f"{name!r} is no name of a parameter. Give a str that is not empty.")
         kind = _kind(name, value)
         with self._changing():
             if name in self._parameters:
@@ -132,7 +134,8 @@ class Parameters:
 
     def _check(self, name: str, value: Value) -> None:
         parameter = self._declared(name)
-        # An empty list is one of any type: which one a sender takes it for says nothing.
+        # An empty list is one of any type: which one a sender takes it for says nothing. Deviation: ROS 2
+        # refuses one of another type.
         is_empty_list = value == [] and isinstance(parameter.value, list)
         if not is_empty_list and _kind(name, value) != parameter.kind:
             raise UsageError(
@@ -152,30 +155,33 @@ class Parameters:
         return self._parameters[name]
 
     def _message(self, name: str) -> Any:
-        """Return the value as it is sent; that of no parameter says that it is not set."""
+        """Return the value as it is sent."""
         message = zero_message(self._value_type)
-        if name in self._parameters:
-            value: Any = self._parameters[name].value
-            message.type, field = self._parameters[name].kind
-            empty = getattr(message, field)
-            if isinstance(empty, np.ndarray):
-                value = np.array(list(value), empty.dtype)
-            setattr(message, field, value)
+        value: Any = self._parameters[name].value
+        message.type, field = self._parameters[name].kind
+        empty = getattr(message, field)
+        if isinstance(empty, np.ndarray):
+            value = np.array(list(value), empty.dtype)
+        setattr(message, field, value)
         return message
 
+    def _asked(self, request: Any) -> Sequence[str]:
+        """Return the names in a request, or none if one of them is not declared, as rclcpp and rclpy do."""
+        names: Sequence[str] = request.names
+        return names if all(name in self._parameters for name in names) else ()
+
     def _describe(self, request: Any, response: Any) -> None:
-        for name in request.names:
+        for name in self._asked(request):
             descriptor = zero_message(self._descriptor_type)
-            descriptor.name, descriptor.type = name, self._message(name).type
-            if name in self._parameters:
-                descriptor.description = self._parameters[name].description
+            descriptor.name, descriptor.type = name, self._parameters[name].kind[0]
+            descriptor.description = self._parameters[name].description
             response.descriptors.append(descriptor)
 
     def _get(self, request: Any, response: Any) -> None:
-        response.values = [self._message(name) for name in request.names]
+        response.values = [self._message(name) for name in self._asked(request)]
 
     def _types(self, request: Any, response: Any) -> None:
-        response.types = np.array([self._message(name).type for name in request.names], np.uint8)
+        response.types = np.array([self._parameters[name].kind[0] for name in self._asked(request)], np.uint8)
 
     def _list(self, request: Any, response: Any) -> None:
         # Another thread may declare one meanwhile.
@@ -195,12 +201,12 @@ class Parameters:
         result = zero_message(self._result_type)
         try:
             with self._changing():
-                values = {parameter.name: _value(parameter) for parameter in parameters}
-                for name, value in values.items():
+                values = [(parameter.name, _value(parameter)) for parameter in parameters]
+                for name, value in values:
                     self._check(name, value)
-                for name, value in values.items():
+                for name, value in values:
                     self._parameters[name].value = value
-                event = self._event([], values)
+                event = self._event([], dict(values))
         except UsageError as error:
             result.reason = str(error)
             return result
@@ -248,11 +254,11 @@ def _are_int64(numbers: Sequence[Any]) -> bool:
 
 
 def _is_listed(name: str, prefixes: Sequence[str], depth: int) -> bool:
-    """Tell whether the name is asked for: below these prefixes, so many levels deep (0: all)."""
-    for prefix in prefixes or [""]:
-        if prefix and not f"{name}.".startswith(f"{prefix}."):
-            continue
-        below = name[len(prefix) :].strip(".")
-        if not depth or below.count(".") < depth:
-            return True
-    return False
+    """Tell whether the name is asked for: one of the prefixes or below it, so many levels deep (0: all)."""
+    if not prefixes:
+        return not depth or name.count(".") < depth
+    return any(
+        name == prefix
+        or (name.startswith(f"{prefix}.") and (not depth or name.count(".", len(prefix) + 1) < depth))
+        for prefix in prefixes
+    )

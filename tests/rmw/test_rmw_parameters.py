@@ -13,6 +13,7 @@ from reconros_zenoh.rmw import parameters as parameters_module
 from reconros_zenoh.rmw.parameters import Parameters
 from reconros_zenoh.ros.graph import EndpointKind, EndpointToken, parse
 from reconros_zenoh.ros.qos import QosProfile
+from reconros_zenoh.ros.zero_message import zero_message
 
 VALUES: dict[str, Any] = {
     "flag": True,
@@ -66,18 +67,25 @@ def remote() -> Remote:
 
 
 def test_values_and_their_types(remote: Remote) -> None:
-    names = [*VALUES, "nothing"]
+    names = list(VALUES)
     values = remote.ask("GetParameters", names=names).values
-    assert [value.type for value in values] == [*KINDS, 0]
+    assert [value.type for value in values] == KINDS
     assert values[0].bool_value is True
     assert values[1].integer_value == 3
     assert values[4].string_value == "left"
     assert values[5].byte_array_value.tolist() == [1, 2]
     assert values[6].bool_array_value.tolist() == [True, False]
     assert values[9].string_array_value == ["a", "b"]
-    assert remote.ask("GetParameterTypes", names=names).types.tolist() == [*KINDS, 0]
+    assert remote.ask("GetParameterTypes", names=names).types.tolist() == KINDS
     described = remote.ask("DescribeParameters", names=names).descriptors
     assert [(d.name, d.type, d.description) for d in described[:1]] == [("flag", 1, "the flag")]
+
+
+def test_who_asks_for_a_parameter_that_is_not_declared_gets_an_empty_answer(remote: Remote) -> None:
+    names = ["flag", "nothing", "count"]
+    assert remote.ask("GetParameters", names=names).values == []
+    assert remote.ask("GetParameterTypes", names=names).types.tolist() == []
+    assert remote.ask("DescribeParameters", names=names).descriptors == []
 
 
 @pytest.mark.parametrize(
@@ -89,6 +97,9 @@ def test_values_and_their_types(remote: Remote) -> None:
         (["gain"], 1, ["gain.x"]),
         (["gain.inner", "flag"], 0, ["flag", "gain.inner.y"]),
         (["gai"], 0, []),
+        (["gain.x", "flag"], 1, ["flag", "gain.x"]),
+        ([""], 0, []),
+        (["", "gain"], 1, ["gain.x"]),
     ],
 )
 def test_the_list(remote: Remote, prefixes: list[str], depth: int, names: list[str]) -> None:
@@ -138,6 +149,14 @@ def test_setting_all_or_none(remote: Remote) -> None:
     assert (remote.parameters.get("count"), remote.parameters.get("flag")) == (7, False)
 
 
+def test_each_value_counts_of_a_parameter_that_is_set_twice_at_once(remote: Remote) -> None:
+    parameter = types().message("rcl_interfaces/msg/Parameter").cls
+    wrong, right = (
+        parameter(name="count", value=remote.parameters._message(name)) for name in ("flag", "count")
+    )
+    assert not remote.ask("SetParametersAtomically", parameters=[wrong, right]).result.successful
+
+
 def test_a_callback_may_refuse_a_value() -> None:
     remote = Remote()
     told: list[int] = []
@@ -183,7 +202,8 @@ def test_a_callback_that_changes_parameters_itself_refuses_the_value() -> None:
 
 def test_what_cannot_be_unset(remote: Remote) -> None:
     parameter = types().message("rcl_interfaces/msg/Parameter").cls
-    unset = parameter(name="count", value=remote.parameters._message("nothing"))
+    not_set = zero_message(types().message("rcl_interfaces/msg/ParameterValue"))
+    unset = parameter(name="count", value=not_set)
     assert not remote.ask("SetParameters", parameters=[unset]).results[0].successful
 
 
@@ -193,6 +213,14 @@ def test_what_no_parameter_can_be(value: Any) -> None:
     with pytest.raises(UsageError, match="cannot be"):
         parameters.declare("x", value)
     parameters.declare("x", [2**63 - 1, -(2**63)])
+
+
+@pytest.mark.parametrize("name", ["", 5, None])
+def test_what_is_no_name_of_a_parameter(name: Any) -> None:
+    remote = Remote()
+    with pytest.raises(UsageError, match=f"{name!r} is no name of a parameter"):
+        remote.parameters.declare(name, 1)
+    assert remote.ask("ListParameters", prefixes=[], depth=0).result.names == []
 
 
 def test_declared_twice(remote: Remote) -> None:
