@@ -7,7 +7,7 @@ from collections import OrderedDict
 from enum import IntEnum
 from typing import TYPE_CHECKING, Any
 
-from reconros_zenoh.errors import BadMessageError
+from reconros_zenoh.errors import BadMessageError, UsageError
 from reconros_zenoh.ros.qos import Durability, QosProfile
 from reconros_zenoh.ros.stamp import set_stamp, stamp_ns
 from reconros_zenoh.ros.zero_message import zero_message
@@ -74,7 +74,12 @@ class GoalHandle:
         self._server.publish_feedback(self, feedback)
 
     def canceled(self) -> None:
-        """Say that the result is that of a goal that was canceled."""
+        """Say that the result is that of a goal that was canceled.
+
+        Raises UsageError when no client wants that: rcl_action has no such transition.
+        """
+        if not self.is_cancel_requested:
+            raise UsageError("canceled() is for a goal whose `is_cancel_requested` is true. Call abort().")
         self.outcome = GoalStatus.CANCELED
 
     def abort(self) -> None:
@@ -159,14 +164,13 @@ class ActionServer:
         assert responder is not None
         goal_id = bytes(request.goal_id.uuid)
         response = zero_message(self._type.send_goal.response)
-        now_ns = self._context.clock_ns()
-        set_stamp(response.stamp, now_ns)
-        handle = GoalHandle(self, goal_id, request.goal, now_ns)
+        handle = GoalHandle(self, goal_id, request.goal, self._context.clock_ns())
         with self._lock:
             response.accepted = goal_id not in self._goals and self._is_accepted(
                 request.goal, received.publisher
             )
             if response.accepted:
+                set_stamp(response.stamp, handle.stamp_ns)
                 self._goals[goal_id] = handle
                 self._entries[goal_id] = self._entry(handle)
         responder.respond_encoded(self._type.send_goal.response.encode(response))

@@ -98,6 +98,8 @@ class Parameters:
         any other exception that it raises becomes one. It cannot declare or set parameters itself, which
         raises one.
         """
+        if not name or not isinstance(name, str):
+            raise UsageError(f"{name!r} is no name of a parameter. Give a str that is not empty.")
         kind = _kind(name, value)
         with self._changing():
             if name in self._parameters:
@@ -132,7 +134,8 @@ class Parameters:
 
     def _check(self, name: str, value: Value) -> None:
         parameter = self._declared(name)
-        # An empty list is one of any type: which one a sender takes it for says nothing.
+        # An empty list is one of any type: which one a sender takes it for says nothing. Deviation: ROS 2
+        # refuses one of another type.
         is_empty_list = value == [] and isinstance(parameter.value, list)
         if not is_empty_list and _kind(name, value) != parameter.kind:
             raise UsageError(
@@ -198,12 +201,12 @@ class Parameters:
         result = zero_message(self._result_type)
         try:
             with self._changing():
-                values = {parameter.name: _value(parameter) for parameter in parameters}
-                for name, value in values.items():
+                values = [(parameter.name, _value(parameter)) for parameter in parameters]
+                for name, value in values:
                     self._check(name, value)
-                for name, value in values.items():
+                for name, value in values:
                     self._parameters[name].value = value
-                event = self._event([], values)
+                event = self._event([], dict(values))
         except UsageError as error:
             result.reason = str(error)
             return result
@@ -251,11 +254,11 @@ def _are_int64(numbers: Sequence[Any]) -> bool:
 
 
 def _is_listed(name: str, prefixes: Sequence[str], depth: int) -> bool:
-    """Tell whether the name is asked for: below these prefixes, so many levels deep (0: all)."""
-    for prefix in prefixes or [""]:
-        if prefix and not f"{name}.".startswith(f"{prefix}."):
-            continue
-        below = name[len(prefix) :].strip(".")
-        if not depth or below.count(".") < depth:
-            return True
-    return False
+    """Tell whether the name is asked for: one of the prefixes or below it, so many levels deep (0: all)."""
+    if not prefixes:
+        return not depth or name.count(".") < depth
+    return any(
+        name == prefix
+        or (name.startswith(f"{prefix}.") and (not depth or name.count(".", len(prefix) + 1) < depth))
+        for prefix in prefixes
+    )

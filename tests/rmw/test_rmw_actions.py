@@ -96,6 +96,19 @@ def test_a_goal_that_is_refused_is_counted() -> None:
     assert case.sessions.here.rejections.counts() == {"order": 1}
 
 
+@pytest.mark.parametrize(("order", "stamp"), [(3, (0, 1000)), (11, (0, 0))])
+def test_the_answer_to_a_goal_says_when_it_was_accepted_if_it_was(order: int, stamp: tuple[int, int]) -> None:
+    case = Case()
+    answers: list[Any] = []
+    request = zero_message(FIBONACCI.send_goal.request)
+    request.goal.order = order
+    case.client_node.client(FIBONACCI.send_goal, "fibonacci/_action/send_goal").call(
+        request, answers.append, 10**9
+    )
+    case.sessions.settle()
+    assert (answers[0].stamp.sec, answers[0].stamp.nanosec) == stamp
+
+
 def test_a_goal_id_is_accepted_once() -> None:
     case = Case()
     goal_id = case.send()
@@ -122,6 +135,17 @@ def test_a_canceled_goal(honours: bool) -> None:
     case.client.cancel(goal_id)
     case.sessions.settle()
     assert case.kinds()[-1] == "not canceling"
+
+
+def test_a_goal_that_nobody_cancels_cannot_end_as_canceled() -> None:
+    case = Case()
+    case.send()
+    (goal,) = case.goals
+    case.server.execute(goal)
+    with pytest.raises(UsageError, match="a goal whose `is_cancel_requested` is true"):
+        goal.canceled()
+    case.finish(goal, 0)
+    assert case.events[-1].status is GoalStatus.SUCCEEDED
 
 
 def cancel_code(case: Case, goal_id: bytes, stamp_ns: int = 0) -> tuple[int, int]:

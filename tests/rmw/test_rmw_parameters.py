@@ -98,6 +98,9 @@ def test_nothing_is_answered_when_one_of_the_names_is_not_declared(remote: Remot
         (["gain"], 1, ["gain.x"]),
         (["gain.inner", "flag"], 0, ["flag", "gain.inner.y"]),
         (["gai"], 0, []),
+        (["gain.x", "flag"], 1, ["flag", "gain.x"]),
+        ([""], 0, []),
+        (["", "gain"], 1, ["gain.x"]),
     ],
 )
 def test_the_list(remote: Remote, prefixes: list[str], depth: int, names: list[str]) -> None:
@@ -145,6 +148,14 @@ def test_setting_all_or_none(remote: Remote) -> None:
     assert remote.parameters.get("count") == 3
     assert remote.set("SetParametersAtomically", count=7, flag=False).result.successful
     assert (remote.parameters.get("count"), remote.parameters.get("flag")) == (7, False)
+
+
+def test_each_value_counts_of_a_parameter_that_is_set_twice_at_once(remote: Remote) -> None:
+    parameter = types().message("rcl_interfaces/msg/Parameter").cls
+    wrong, right = (
+        parameter(name="count", value=remote.parameters._message(name)) for name in ("flag", "count")
+    )
+    assert not remote.ask("SetParametersAtomically", parameters=[wrong, right]).result.successful
 
 
 def test_a_callback_may_refuse_a_value() -> None:
@@ -202,6 +213,14 @@ def test_what_no_parameter_can_be(value: Any) -> None:
     with pytest.raises(UsageError, match="cannot be"):
         parameters.declare("x", value)
     parameters.declare("x", [2**63 - 1, -(2**63)])
+
+
+@pytest.mark.parametrize("name", ["", 5, None])
+def test_what_is_no_name_of_a_parameter(name: Any) -> None:
+    remote = Remote()
+    with pytest.raises(UsageError, match=f"{name!r} is no name of a parameter"):
+        remote.parameters.declare(name, 1)
+    assert remote.ask("ListParameters", prefixes=[], depth=0).result.names == []
 
 
 def test_declared_twice(remote: Remote) -> None:
