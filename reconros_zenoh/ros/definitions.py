@@ -78,20 +78,6 @@ def action_definitions(name: str, text: str) -> Typesdict:
     }
 
 
-def char_as_uint8(description: FieldDesc) -> FieldDesc:
-    """Return the description of a field with `char` replaced by the `uint8` that rosidl makes of it.
-
-    Both have the same bytes, but rosbags gives `char` a type id of its own and so another RIHS01 hash.
-    """
-    if description == (Nodetype.BASE, ("char", 0)):
-        return (Nodetype.BASE, ("uint8", 0))
-    if description[0] == Nodetype.ARRAY or description[0] == Nodetype.SEQUENCE:
-        element, size = description[1]
-        if element == (Nodetype.BASE, ("char", 0)):
-            return (description[0], ((Nodetype.BASE, ("uint8", 0)), size))
-    return description
-
-
 def _package(name: str, kind: str) -> str:
     package, _, rest = name.partition("/")
     its_kind, _, type_name = rest.partition("/")

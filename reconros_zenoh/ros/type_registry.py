@@ -12,7 +12,6 @@ from rosbags.typesys import Stores, TypesysError, get_typestore
 from reconros_zenoh.errors import FileError, UsageError
 from reconros_zenoh.ros.definitions import (
     action_definitions,
-    char_as_uint8,
     message_definition,
     service_definitions,
 )
@@ -23,7 +22,7 @@ from reconros_zenoh.ros.types import ActionType, MessageType, ServiceType
 if TYPE_CHECKING:
     from collections.abc import Collection
 
-    from rosbags.interfaces.typing import Typesdict
+    from rosbags.interfaces.typing import FieldDesc, Typesdict
     from rosbags.typesys.store import Typestore
 
 _DEEPEST = 19
@@ -135,7 +134,7 @@ class TypeRegistry:
     def _store(self) -> Typestore:
         store = get_typestore(Stores.ROS2_JAZZY)
         for name, (constants, fields) in store.fielddefs.items():
-            store.fielddefs[name] = (constants, [(field, char_as_uint8(form)) for field, form in fields])
+            store.fielddefs[name] = (constants, [(field, _char_as_uint8(form)) for field, form in fields])
         return store
 
     def _add_standard(self, name: str) -> None:
@@ -192,3 +191,17 @@ def _folded(name: str) -> tuple[str, str]:
     """Return `name` so that the split words of ReconROS, U_Int32_Multi_Array, make no difference."""
     package_and_kind, _, type_name = name.rpartition("/")
     return package_and_kind, type_name.replace("_", "").lower()
+
+
+def _char_as_uint8(description: FieldDesc) -> FieldDesc:
+    """Return the description of a field with `char` replaced by the `uint8` that rosidl makes of it.
+
+    Both have the same bytes, but rosbags gives `char` a type id of its own and so another RIHS01 hash.
+    """
+    if description == (Nodetype.BASE, ("char", 0)):
+        return (Nodetype.BASE, ("uint8", 0))
+    if description[0] == Nodetype.ARRAY or description[0] == Nodetype.SEQUENCE:
+        element, size = description[1]
+        if element == (Nodetype.BASE, ("char", 0)):
+            return (description[0], ((Nodetype.BASE, ("uint8", 0)), size))
+    return description

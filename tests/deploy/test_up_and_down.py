@@ -146,12 +146,15 @@ def test_ctrl_c_stops_all(services: Services, start: Start, number: signal.Signa
 
 
 def test_up_ends_when_nobody_reads_what_it_prints(services: Services, start: Start) -> None:
-    talking = "import time\nwhile True:\n    print('x', flush=True)\n    time.sleep(0.01)"
+    closed = services.folder / "closed"
+    os.mkfifo(closed)
+    talking = "(folder / 'closed').read_text()\nprint('x', flush=True)\nblock()"
     services.compose_file(services.service("one", talking))
     with start("up") as process:
         assert process.stdout is not None
         process.stdout.readline()
         process.stdout.close()
+        closed.write_text("")  # now it may print
         assert process.wait() == 130
     services.assert_gone()
 
