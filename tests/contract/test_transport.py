@@ -404,11 +404,14 @@ def test_a_querier_hears_whether_it_has_a_server(network: Network) -> None:
 @pytest.mark.parametrize("reliability", list(Reliability), ids=lambda reliability: reliability.name)
 def test_a_late_subscriber_gets_the_last_messages_once(network: Network, reliability: Reliability) -> None:
     qos = QosProfile(reliability, Durability.TRANSIENT_LOCAL, depth=3)
-    here, there = network.session(), network.session()
-    know(network, here, there)
+    here, there, third = network.session(), network.session(), network.session()
+    early = network.inbox()
+    third.subscribe(KEY, early.put_text, QosProfile(reliability))
+    know(network, here, there, third)
     publisher = here.publish(KEY, qos)
     for number in range(5):
         publisher.put([str(number).encode()], None)
+    network.wait(early.has("0", "1", "2", "3", "4"))  # none is on its way: a token would overtake messages
     know(network, there, here)
 
     late, last, volatile = network.inbox(), network.inbox(), network.inbox()
