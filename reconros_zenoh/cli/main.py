@@ -8,7 +8,7 @@ import logging
 import signal
 import sys
 import warnings
-from typing import NoReturn
+from typing import Annotated, NoReturn
 
 import typer
 
@@ -102,7 +102,7 @@ def _application(verbs: list[str]) -> typer.Typer:
         rich_markup_mode=None,
         add_completion=False,
     )
-    application.callback()(lambda: None)
+    application.callback()(_options)
     for verb in verbs:
         module, name = _VERBS[verb]
         command = getattr(importlib.import_module(f"reconros_zenoh.cli.{module}"), name)
@@ -111,6 +111,27 @@ def _application(verbs: list[str]) -> typer.Typer:
         else:
             application.command(verb)(command)
     return application
+
+
+def _show_versions(is_wanted: bool) -> None:
+    if is_wanted:
+        from reconros_zenoh.experiments.provenance import versions
+
+        for name, version in versions().items():
+            print(name, version)
+        raise typer.Exit
+
+
+_Version = Annotated[
+    bool,
+    typer.Option(
+        "--version", callback=_show_versions, is_eager=True, help="Show the versions of what is used here."
+    ),
+]
+
+
+def _options(version: _Version = False) -> None:
+    """Take what may stand before the verb; of `version` its own callback has seen to."""
 
 
 def _fail(error: str, status: int) -> NoReturn:

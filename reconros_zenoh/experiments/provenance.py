@@ -26,15 +26,18 @@ def machine() -> str:
     return f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores"
 
 
+def versions() -> dict[str, str]:
+    """Return the versions of this program and of what its results rest on."""
+    packages = ("reconros-zenoh", "eclipse-zenoh", "simpy", "numpy")
+    return {name: version(name) for name in packages} | {"Python": platform.python_version()}
+
+
 def provenance() -> dict[str, Any]:
     """Return the date, the command and the versions of what took part."""
     return {
         "date": datetime.now(UTC).isoformat(timespec="seconds"),
         "command": shlex.join(["reconros", *sys.argv[1:]]),
-        "versions": {
-            "Python": platform.python_version(),
-            **{name: version(name) for name in ("reconros-zenoh", "eclipse-zenoh", "simpy", "numpy")},
-        },
+        "versions": versions(),
     }
 
 

@@ -7,6 +7,7 @@ import logging
 import os
 import subprocess
 import sys
+from importlib.metadata import version
 from typing import TYPE_CHECKING
 
 import pytest
@@ -27,6 +28,13 @@ def test_the_list_of_commands_cuts_no_sentence(group: tuple[str, ...]) -> None:
     lines = shown.partition("Commands:\n")[2].splitlines()
     assert len(lines) >= 5
     assert [line for line in lines if not line.endswith(".") or line.endswith("..")] == []
+
+
+def test_it_says_its_versions() -> None:
+    done = CliRunner().invoke(application, ["--version"])
+    assert done.exit_code == 0
+    assert f"reconros-zenoh {version('reconros-zenoh')}\n" in done.stdout
+    assert f"eclipse-zenoh {version('eclipse-zenoh')}\n" in done.stdout
 
 
 @pytest.mark.parametrize(
