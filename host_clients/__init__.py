@@ -1,1 +1,1 @@
-"""The desktop side of the experiments: a closed-loop client per callback; camera, viewer and scope."""
+"""The desktop side of the experiments: a closed-loop client per callback; camera, viewer, scope, robot."""

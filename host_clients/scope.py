@@ -25,7 +25,7 @@ _MOST_WAITING = 1000  # commands without an index, or the reverse; then one side
 class Scope:
     """Listens to /ctrl_out and /tf_out and tells how long the inverse kinematics took between them.
 
-    `on_trip`, in the thread of the event loop, gets a round trip per command of the controller: its number,
+    `on_trip`, called by the event loop, gets a round trip per command of the controller: its number,
     the time from its publication to that of its servo index (source timestamps), and `ok`. A command is
     `lost` when the index of a later one comes first, and `wrong` stands for an index that no command asks for
     within a second. The topics come over two threads, so an index may be heard before its command.

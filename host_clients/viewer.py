@@ -29,7 +29,7 @@ _MOST_LEFT_OUT = 100_000  # hours of pictures; each is one line in the record
 
 
 class Viewer:
-    """Subscribes to /image_filtered and tells of each picture, in the thread of the event loop.
+    """Subscribes to /image_filtered and tells of each picture, called by the event loop.
 
     `on_picture` gets it as uint8[480, 640, 3]. `on_trip` gets its round trip: its number, the time from the
     camera to here on their common clock, and whether it is what the kernel makes of the camera's; numbers

@@ -1,1 +1,1 @@
-"""The model of one board: workers, slots, memory, cores, DDS stack, and its daemon-independent wiring."""
+"""The model of one board: executor, workers, slots, memory, cores, DDS stack, topics and gateways."""

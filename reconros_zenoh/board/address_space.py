@@ -41,7 +41,7 @@ class _Block:
 class AddressSpace:
     """Blocks of memory at virtual addresses, each with exact bounds and an unmapped page behind it.
 
-    `pointer_bytes` is 4 or 8, as the processor has it. Belongs to the thread of the event loop. Source:
+    `pointer_bytes` is 4 or 8, as the processor has it. Belongs to the event loop. Source:
     Gateways, Section 2.2 ("the MEMIF interface enables memory accesses in virtual address space").
     """
 

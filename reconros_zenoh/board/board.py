@@ -59,7 +59,7 @@ class Board:
     """Cores, slots, configuration port, memory interface and communication stack of one board.
 
     Without a model in its profile (`native`) every part is there and costs nothing. What does not say
-    otherwise belongs to the thread of the event loop.
+    otherwise belongs to the event loop.
     """
 
     def __init__(

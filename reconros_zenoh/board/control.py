@@ -87,7 +87,7 @@ class ControlServer:
             declaration.close()
 
     def _on_status(self, request: Request) -> None:
-        # The board's state belongs to the thread of its event loop.
+        # The board's state belongs to its event loop.
         self._board.environment.post(self._reply_status, request, request.read() == _HOST_ANEW)
 
     def _reply_status(self, request: Request, host_anew: bool) -> None:

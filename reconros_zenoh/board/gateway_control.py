@@ -62,7 +62,7 @@ class GatewayServer:
         self._declaration.close()
 
     def _on_request(self, request: Request) -> None:
-        # The board's state belongs to the thread of its event loop.
+        # The board's state belongs to its event loop.
         self._board.environment.post(self._reply, request)
 
     def _reply(self, request: Request) -> None:

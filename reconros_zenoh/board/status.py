@@ -21,7 +21,7 @@ _AGES = {"age_p50_ms": 50, "age_p95_ms": 95, "age_max_ms": 100}
 
 
 def status(board: Board, executor: Executor) -> dict[str, Any]:
-    """Return what the board is and what it has done so far; called by the thread of its event loop.
+    """Return what the board is and what it has done so far; called by its event loop.
 
     `host` says how well this host kept up: results later than the model had them ready (`overruns`), and, in
     wall time only, how late the event loop was (`lag_*`) and whether it goes before other threads
@@ -106,7 +106,7 @@ def _publishers(writers: Iterable[TopicWriter]) -> dict[str, dict[str, float | N
 
 
 def gateways(board: Board) -> list[dict[str, Any]]:
-    """Return the gateways of a board and what passed them; called by the thread of its event loop.
+    """Return the gateways of a board and what passed them; called by its event loop.
 
     `late` messages came between request and cancel; `refused` ones did not fit a FIFO.
     """

@@ -1,1 +1,1 @@
-"""The one event loop: jumping in virtual time or held to the monotonic clock."""
+"""The one event loop, in virtual time or held to the monotonic clock; signals; how a process begins."""

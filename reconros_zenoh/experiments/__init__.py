@@ -1,1 +1,1 @@
-"""The experiments of the papers, on emulated boards."""
+"""The experiments of the papers; comparisons, Compose files in virtual time, and calibration."""

@@ -1,1 +1,1 @@
-"""The files of a ReconROS project: `build.cfg`, interfaces and mappings."""
+"""A ReconROS project: reading `build.cfg`, interfaces, mappings and main.py, and putting it on a board."""

@@ -1,6 +1,6 @@
 """The waist of the project: what a transport does, in bytes and attachments.
 
-Everything outside this package sees only this file and nothing of Zenoh.
+Who uses a transport sees only this file; which one it is, only those know that open it.
 
 Threads: every method may be called from any thread. Sinks and callbacks run on a thread of the transport, or
 within the call that caused them when both ends are in one session (`SimulatedTransport`: as events of its

@@ -1,1 +1,1 @@
-"""A ReconROS project folder."""
+"""The project with a gateway: subscribers in hardware read a stream."""

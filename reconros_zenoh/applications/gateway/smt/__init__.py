@@ -1,1 +1,1 @@
-"""A ReconROS project folder."""
+"""The project without a gateway: all subscribers read the software-mapped topic."""
