@@ -69,8 +69,8 @@ class DrivingRobot:
 
     It stops when no command has come for half a second. It begins once somebody subscribes, and fails
     with TransportError when nobody does. `done` happens 2 s after the last picture. `on_trip` gets for
-    each picture how long it took until its command was here; those without one are `lost` at the end.
-    `unexpected` counts commands for no picture of this robot.
+    each picture how long it took until its command was here; those without one are `lost` at the end, and
+    what comes for them later is left aside. `unexpected` counts commands for no picture of this robot.
     """
 
     def __init__(
@@ -132,6 +132,8 @@ class DrivingRobot:
         self._environment.post(self._obey, received.message, self._node.context.clock_ns())
 
     def _obey(self, command: Any, arrived_ns: int) -> None:
+        if self.done.triggered:
+            return
         taken = self._taken.pop(command.header.frame_id, None)
         if taken is None:
             self.unexpected += 1

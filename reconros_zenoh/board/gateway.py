@@ -71,8 +71,8 @@ class Gateway:
 
     @property
     def dropped(self) -> int:
-        """How many messages were pushed out by newer ones, on their way in from the SMT or out to it."""
-        return self._smt.dropped + self._writer.dropped
+        """How many messages from the SMT were pushed out by newer ones; those to it are its publisher's."""
+        return self._smt.dropped
 
     def close(self) -> None:
         """Take the gateway out of the graph."""

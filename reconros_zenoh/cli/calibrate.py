@@ -187,6 +187,9 @@ def _print(console: Console, found: Calibration) -> None:
         f"{found.noise:.3f} (standard deviation). {found.evaluations} evaluations.",
         highlight=False,
     )
+    if all(each.value == each.constant.value for each in found.constants):
+        told = "nothing better was found: the constants are as they were. More --requests lower the noise."
+        console.print(Text(told, style="yellow"))
     if vague := [each.constant.name for each in found.constants if each.determined is False]:
         console.print(
             Text(

@@ -63,7 +63,7 @@ def gateway(
             raise UsageError("profile native runs in real time, with the publisher in software.")
         publishers = [Side.SOFTWARE]
     else:
-        check_profile(board)
+        check_profile(board, publishers, counts)
     with own_folder(out):
         _prepare(out)
         with run_bar("cells", len(publishers) * len(byte_counts) * len(counts), quiet=as_json) as advance:

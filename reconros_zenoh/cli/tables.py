@@ -13,7 +13,7 @@ from reconros_zenoh.cli.console import interrupted, new_table, wide_console
 from reconros_zenoh.cli.options import AsJson, ClockName, Profile
 from reconros_zenoh.cli.progress import run_bar
 from reconros_zenoh.mapping.graph import Side
-from reconros_zenoh.measure.statistics import format_error, format_ms, format_share
+from reconros_zenoh.measure.statistics import format_error, format_ms, format_part, format_share
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -115,7 +115,7 @@ def _print_callbacks(console: Console, result: Mapping[str, Any]) -> None:
         table.add_row(
             name,
             _marked(row["hardware_ms"], row["basis_hardware"]),
-            *(format_ms(split[part]) for part in ("compute_ms", "memif_ms", "calls_ms")),
+            *(format_part(split[part]) for part in ("compute_ms", "memif_ms", "calls_ms")),
             format_ms(row["paper_hardware_ms"]),
             format_error(row["hardware_deviation"]),
             _marked(row["software_ms"], row["basis_software"]),

@@ -163,8 +163,9 @@ def calibrate(
 ) -> Calibration:
     """Return the profile fitted to what was measured; the same arguments give the same result.
 
-    At most so many `rounds` of damped Gauss-Newton steps, see `_Search`. `on_evaluation` is called after each
-    evaluation (three runs of different seeds under each measured mapping).
+    At most so many `rounds` of damped Gauss-Newton steps, see `_Search`; where they end with something worse
+    than the profile, that is kept. `on_evaluation` is called after each evaluation (three runs of different
+    seeds under each measured mapping).
 
     Ctrl-C ends the search with the best values so far; before it has begun it raises KeyboardInterrupt.
     """
@@ -197,6 +198,8 @@ def calibrate(
         with until_interrupted() as interruption:
             search.run(rounds, evaluate)
             after = evaluate([(search.values, each) for each in range(SAMPLES)])
+            if _mean_objective(after) > _mean_objective(before):
+                search.values, after = start, before
             around = evaluate([(each, 0) for each in _around(constants, search.values, _SENSITIVITY_STEP)])
     after = after or search.best
     variances = [np.var([each.objective for each in some], ddof=1) for some in (before, after)]
@@ -218,8 +221,8 @@ def calibrate(
             for mapping in measured
             for client, quartiles in mapping.quartiles_ms.items()
         ),
-        before=float(np.mean([each.objective for each in before])),
-        after=float(np.mean([each.objective for each in after])),
+        before=_mean_objective(before),
+        after=_mean_objective(after),
         noise=math.sqrt(np.mean(variances)),
         evaluations=evaluations,
         interrupted=interruption.happened,
@@ -355,6 +358,10 @@ def _compare(measured: Sequence[MeasuredMapping], records: Sequence[Mapping[str,
             # A time may be a whole number of seconds, which is 0 modulo 1 s.
             residuals.append(np.log(np.maximum(ours, _LEAST_MS) / real))
     return _Evaluation(cells, np.concatenate(residuals))
+
+
+def _mean_objective(evaluations: Sequence[_Evaluation]) -> float:
+    return float(np.mean([each.objective for each in evaluations]))
 
 
 def _mean_quartiles(evaluations: Sequence[_Evaluation], cell: tuple[str, str]) -> tuple[float, ...]:

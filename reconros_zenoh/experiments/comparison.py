@@ -54,7 +54,9 @@ class MappingRun:
                 )
                 for topic, ages_ns in self.ages_ns.items()
             },
-            "dropped": sum(each["dropped"] for each in (*callbacks, *published.values())),
+            "dropped": sum(
+                each["dropped"] for each in (*callbacks, *published.values(), *self.status["gateways"])
+            ),
             "refused": sum(self.status["rejected"].values()),
             "failed": sum(callback["failed"] for callback in callbacks),
             "reconfigurations": sum(slot["reconfigurations"] for slot in slots),

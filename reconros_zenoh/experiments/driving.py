@@ -6,7 +6,7 @@ import csv
 import shutil
 import statistics
 import tempfile
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.resources import as_file, files
 from itertools import pairwise
 from pathlib import Path
@@ -15,10 +15,10 @@ from typing import TYPE_CHECKING, Any
 from host_clients.robot import RobotOptions, Step, most_off_lane_mm, stood_s
 from reconros_zenoh.applications.driving.chain import STATIONS, Chain
 from reconros_zenoh.applications.driving.kernels import LANE_WIDTH
-from reconros_zenoh.applications.driving.main import run_nodes
+from reconros_zenoh.applications.driving.main import main, run_nodes
 from reconros_zenoh.errors import ExperimentError, UsageError
 from reconros_zenoh.experiments.provenance import machine, provenance, writing
-from reconros_zenoh.experiments.simulation import Simulation
+from reconros_zenoh.experiments.simulation import Simulation, check_hosting
 from reconros_zenoh.mapping.apply import apply_mapping
 from reconros_zenoh.mapping.communication import TopicMapping, map_topics
 from reconros_zenoh.mapping.project_graph import read_project_graph
@@ -30,7 +30,6 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from reconros_zenoh.board.profile import Profile
-    from reconros_zenoh.project.loader import ProjectFiles
 
 VARIANTS: dict[str, frozenset[TopicMapping]] = {
     "all_software": frozenset(),
@@ -74,11 +73,14 @@ class Drive:
 
 
 def check_profile(profile: Profile) -> None:
-    """Raise UsageError for a profile without the times of topics inside a board."""
-    if profile.model is None or profile.model.topics is None or profile.model.hmt is None:
+    """Raise UsageError for a profile without a time that one of the variants needs."""
+    if profile.model is None or profile.model.topics is None:
         raise UsageError(
             f"profile {profile.name!r} does not know what topics inside a board cost. Use --profile zcu104."
         )
+    for applied in VARIANTS.values():
+        project = _mapped_project(applied)
+        check_hosting(profile, project, project.mapping(None))
 
 
 def run_variant(profile: Profile, variant: str, pictures: int) -> Drive:
@@ -86,9 +88,7 @@ def run_variant(profile: Profile, variant: str, pictures: int) -> Drive:
     mapped = _mapped_project(VARIANTS[variant])
     with Simulation(mapped.types()) as simulation:
         chain = Chain(simulation.environment.clock_ns)
-        project = Project(
-            mapped.folder, mapped.configuration, mapped.interfaces, lambda app: run_nodes(app, chain.note)
-        )
+        project = replace(mapped, main=lambda app: run_nodes(app, chain.note))
         simulation.add_board(profile, project, project.mapping(None), BoardOptions())
         trips: list[RoundTrip] = []
         robot = simulation.add_robot(RobotOptions(pictures), trips.append)
@@ -210,7 +210,7 @@ def _variant(name: str, drive: Drive) -> dict[str, Any]:
     }
 
 
-def _mapped_project(applied: frozenset[TopicMapping]) -> ProjectFiles:
+def _mapped_project(applied: frozenset[TopicMapping]) -> Project:
     """Return the driving example with these of its topics mapped as `reconros map --apply` writes it."""
     with (
         as_file(files("reconros_zenoh.applications.driving")) as shipped,
@@ -229,4 +229,5 @@ def _mapped_project(applied: frozenset[TopicMapping]) -> ProjectFiles:
                 for topic, decision in decisions.items()
             },
         )
-        return read_project(copy)
+        mapped = read_project(copy)
+        return Project(mapped.folder, mapped.configuration, mapped.interfaces, main)

@@ -16,6 +16,7 @@ from reconros_zenoh.clock.wall import WallEnvironment
 from reconros_zenoh.errors import ExperimentError, UsageError
 from reconros_zenoh.experiments.interruption import until_interrupted
 from reconros_zenoh.experiments.provenance import host, provenance
+from reconros_zenoh.experiments.simulation import check_hosting
 from reconros_zenoh.mapping.graph import Side
 from reconros_zenoh.project.hosting import BoardOptions, HostedBoard
 from reconros_zenoh.project.loader import load_project
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
     from reconros_zenoh.board.profile import Profile
     from reconros_zenoh.experiments.roundtrip import Clock
     from reconros_zenoh.project.application import Application
+    from reconros_zenoh.project.loader import Project
 
 Variant = Literal["smt", "bridged"]
 SIZES = {"10kB": 10_000, "100kB": 100_000, "1MB": 1_000_000, "10MB": 10_000_000}
@@ -77,13 +79,15 @@ class Cell:
         return self.smt.sw_ms / self.gateway.sw_ms
 
 
-def check_profile(profile: Profile) -> None:
-    """Raise UsageError for a profile without the times of topics inside a board."""
+def check_profile(profile: Profile, publishers: Iterable[Side], counts: Sequence[int]) -> None:
+    """Raise UsageError for a profile without a time that one of the setups needs."""
     if profile.model is None or profile.model.topics is None:
         raise UsageError(
             f"profile {profile.name!r} does not know what topics inside a board cost. Use --profile zcu104, "
             "or native to measure this host."
         )
+    for variant, publisher in product(get_args(Variant), publishers):
+        check_hosting(profile, _project(variant), setup_mapping(publisher, max(counts)))
 
 
 def measure_gateway(
@@ -173,6 +177,11 @@ def setup_mapping(publisher: Side, count: int) -> ProjectMapping:
     )
 
 
+def _project(variant: Variant) -> Project:
+    with as_file(files("reconros_zenoh.applications.gateway") / variant) as folder:
+        return load_project(folder)
+
+
 def _run(
     clock: Clock,
     profile: Profile,
@@ -185,8 +194,6 @@ def _run(
     """Return the times of one setup, and how often this host was slower than the model."""
     environment = WallEnvironment() if clock == "wall" else VirtualEnvironment()
     rounds = _Rounds(environment, count, repeat)
-    with as_file(files("reconros_zenoh.applications.gateway") / variant) as folder:
-        project = load_project(folder)
 
     def main(app: Application) -> None:
         run_nodes(app, body, rounds, rounds.note)
@@ -196,7 +203,7 @@ def _run(
         environment,
         network.transport("b0"),
         profile,
-        replace(project, main=main),
+        replace(_project(variant), main=main),
         setup_mapping(publisher, count),
         BoardOptions(),
     )

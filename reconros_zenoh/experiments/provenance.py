@@ -7,7 +7,7 @@ import os
 import platform
 import shlex
 import sys
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from datetime import UTC, datetime
 from importlib.metadata import version
 from tempfile import TemporaryFile
@@ -59,10 +59,11 @@ def writing(place: Path) -> Iterator[None]:
 def own_folder(folder: Path) -> Iterator[None]:
     """Run the block with a folder that no other experiment writes to at the same time.
 
-    Makes the folder; raises UsageError when that fails, when nothing can be written there, or while another
-    experiment has it.
+    Makes the folder, and removes it when nothing was written there. Raises UsageError when it cannot be made,
+    when nothing can be written there, or while another experiment has it.
     """
     with writing(folder):
+        made = [each for each in (folder, *folder.parents) if not each.exists()]
         folder.mkdir(parents=True, exist_ok=True)
         TemporaryFile(dir=folder).close()  # now, rather than when the results are there
         descriptor = os.open(folder, os.O_RDONLY)
@@ -73,6 +74,9 @@ def own_folder(folder: Path) -> Iterator[None]:
             )
         yield
     finally:
+        with suppress(OSError):  # something is in it
+            for each in made:
+                each.rmdir()
         os.close(descriptor)
 
 

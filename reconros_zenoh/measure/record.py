@@ -124,7 +124,7 @@ def read_record(path: Path) -> Record:
     Reads the files of RecordWriter and any file of times in ms that are separated by `;`, `,` or line breaks,
     with an optional header word, as the authors of the paper logged them (`Periodic;`, `692.845;`, ...). All
     values of such a file are kept, warm-up and totals too; `nan` is a lost request. Raises FileError, with
-    the line, for anything else.
+    the line, for anything else; what begins with a digit, as `692ms`, is no header but a mistake.
     """
     lines = read_text_file(path, "Give a file of round-trip times in ms.", _LIMIT_BYTES).split("\n")
     if lines[0].strip() == HEADER:
@@ -217,7 +217,7 @@ def _read_values(path: Path, lines: list[str]) -> Record:
             value = _milliseconds(path, number, token)
             if value is not None:
                 values.append(value)
-            elif values or lost or header:
+            elif values or lost or header or token[0].isdigit():
                 raise _not_a_time(path, number, token)
             else:
                 header = True
@@ -239,5 +239,8 @@ def _milliseconds(path: Path, number: int, token: str) -> float | None:
 
 def _not_a_time(path: Path, number: int, token: str) -> FileError:
     return FileError(
-        path, number, f"{token!r} is not a time in ms.", "Times are numbers from 0 on, as in 12.5."
+        path,
+        number,
+        f"{token!r} is not a time in ms.",
+        "Times are numbers from 0 on without a unit, as in 12.5.",
     )

@@ -15,7 +15,7 @@ from reconros_zenoh.measure.reference.zynq7100 import (
     reference_cells,
     reference_notes,
 )
-from reconros_zenoh.measure.statistics import format_error, format_ms, format_speedup
+from reconros_zenoh.measure.statistics import format_error, format_ms, format_part, format_speedup
 from reconros_zenoh.measure.trust import trust_section
 
 if TYPE_CHECKING:
@@ -203,7 +203,7 @@ def _stages(spans: Mapping[str, Mapping[str, Mapping[str, float]]]) -> str:
     cells = _by_client(spans)
     stages = list(stage_colours(stage for _, _, cell in cells for stage in cell))
     rows: list[list[Cell]] = [
-        [client, mapping, *(format_ms(cell.get(stage)) for stage in stages)]
+        [client, mapping, *(format_part(cell.get(stage)) for stage in stages)]
         for mapping, client, cell in cells
     ]
     return table(["client", "mapping", *stages], rows)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -44,7 +45,14 @@ def summarise(
 
 
 def format_ms(value: float | None) -> str:
-    """Return the time with two decimals, from 100 ms on with one; `-` for None."""
+    """Return the time as `format_part` does, but below 0.1 ms with two significant digits, as far as 1 ns."""
+    if value is not None and 0 < value < 0.1:
+        return f"{value:.{min(6, 1 - math.floor(math.log10(value)))}f}"
+    return format_part(value)
+
+
+def format_part(value: float | None) -> str:
+    """Return the time, as a part of others, with two decimals, from 100 ms on with one; `-` for None."""
     if value is None:
         return "-"
     return f"{value:.{2 if value < 100 else 1}f}"

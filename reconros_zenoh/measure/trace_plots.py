@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from itertools import cycle
+from colorsys import hsv_to_rgb
+from itertools import count
 from typing import TYPE_CHECKING
 
 from reconros_zenoh.measure.plots import GREY, STAGE_COLOURS, drawing_style
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
@@ -19,6 +20,7 @@ _DRAWN_NS = 1_000_000_000
 _RECONFIGURATION = STAGE_COLOURS["reconfiguration"]
 _WAYS = {"in": GREY, "out": "#c9ced6"}
 _HEIGHT = 0.72
+_HUE_STEP = 0.618034  # golden section of the circle: neighbours are far apart, and none comes again
 _LEGEND_LETTERS = 50  # of the callbacks in a row, beside the other keys
 _COLOURS = (
     "#d2691e",
@@ -53,7 +55,7 @@ def trace_figure(board: str, trace: Trace) -> Figure:
     names = [track.name for track in trace.tracks]
     shared = (trace.icap.name, trace.stack.name)
     callbacks = sorted({each.name for each in slices if each.track not in shared})
-    colours = dict(zip(callbacks, cycle(_COLOURS), strict=False))
+    colours = dict(zip(callbacks, _callback_colours(), strict=False))
     with drawing_style():
         figure = NotebookFigure(figsize=(10, 0.42 * len(names) + 1.3), layout="constrained")
         axes = figure.subplots()
@@ -71,6 +73,15 @@ def trace_figure(board: str, trace: Trace) -> Figure:
         rows = 1 + sum(len(name) for name in callbacks) // _LEGEND_LETTERS
         figure.legend(handles=keys, loc="outside upper left", ncols=-(-len(keys) // rows))
     return figure
+
+
+def _callback_colours() -> Iterator[str]:
+    """Yield colours that differ, without end: twelve that were chosen, then brighter ones."""
+    from matplotlib.colors import to_hex  # noqa: PLC0415  as above
+
+    yield from _COLOURS
+    for number in count():
+        yield to_hex(hsv_to_rgb(number * _HUE_STEP % 1, 0.8, 1.0))
 
 
 def _draw_track(axes: Axes, line: int, slices: Sequence[Slice], colours: dict[str, str]) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gzip
 import pickle
+import runpy
 import sys
 from collections import Counter
 from typing import TYPE_CHECKING, Any
@@ -49,3 +50,14 @@ def test_a_file_that_asks_for_more_than_arrays_is_refused(package: Path) -> None
     write(package, Counter())
     with pytest.raises(pickle.UnpicklingError, match="asks for collections"):
         read_digits()
+
+
+def test_what_the_training_needs_is_said_where_it_is_missing(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for name in ("mnist", "onnx", "torch"):
+        monkeypatch.setitem(sys.modules, name, None)
+    with pytest.raises(SystemExit) as ended:
+        runpy.run_module("reconros_zenoh.applications.roundtrip.training.train", run_name="__main__")
+    assert ended.value.code == 2
+    assert "no package 'mnist'. Install what the training needs: pip install -e" in capsys.readouterr().err

@@ -396,6 +396,32 @@ def test_an_interrupted_search_keeps_the_best_that_it_has_found(
         assert "do not determine" not in printed
 
 
+class _MisleadingRuns(_Runs):
+    """Runs whose times are a third of that for the seeds of the search."""
+
+    def records(self, runs: Iterable[Run]) -> Iterator[dict[str, Record]]:
+        runs = list(runs)
+        _Runs.left = len(runs)
+        for run, records in zip(runs, super().records(runs), strict=True):
+            share = 1 if run.seed < SAMPLES * _SEEDS else 1 / 3
+            yield {client: Record(client, share * record.values_ms) for client, record in records.items()}
+
+
+def test_what_is_worse_than_before_is_not_kept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    profile = fitting_only(tmp_path / "p.toml", PER_MESSAGE)
+    start = read_profile(str(profile)).model.dds.per_message.value  # type: ignore[union-attr]
+    data = measure(tmp_path / "data", "mixed", "Sort;\n" + f"{1.1 * start};\n" * 30)
+    monkeypatch.setattr(calibration, "ParallelRuns", _MisleadingRuns)
+    out = tmp_path / "p2.toml"
+    command(str(profile), [data], out, rounds=2)
+    assert tomllib.loads(out.read_text()) == tomllib.loads(profile.read_text())
+    printed = " ".join(capsys.readouterr().out.split())
+    assert "objective 0.286 before, 0.286 after" in printed  # three quartiles, each off by a tenth
+    assert "nothing better was found: the constants are as they were. More --requests" in printed
+
+
 def test_what_is_interrupted_before_the_search_writes_nothing(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

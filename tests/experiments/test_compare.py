@@ -169,6 +169,33 @@ def test_what_a_publisher_pushes_out_is_lost(tmp_path: Path) -> None:
     assert told["outputs"]["/count"]["sent"] + told["dropped"] == pytest.approx(calls, abs=12)  # on their way
 
 
+def test_what_a_gateway_pushes_out_is_lost(tmp_path: Path) -> None:
+    project = tmp_path / "watcher"
+    new_project(project)
+    (project / "build.cfg").write_text(
+        (project / "build.cfg")
+        .read_text()
+        .replace("slot(0:0)", "slot(0:1)")
+        .replace("Region_0 =", "Region_1 = SLICE_X50Y0:SLICE_X99Y49\nRegion_0 =")
+        .replace("timer = rostmr, node, 100", 'sub = rossub, node, std_msgs/UInt32, "/word", hw, 1, block')
+        + "[ROSGateway@bridge]\nSlot = slot(1)\nHWTopic = /word\nSWTopic = /word\n"
+        "MsgType = std_msgs/UInt32\nDepth = 1\n"
+    )
+    (project / "main.py").write_text(
+        "from reconros_zenoh import Cycles\n"
+        "def main(app):\n"
+        "    def hardware(thread):\n"
+        "        yield from thread.compute(lambda: None)\n"
+        "    app.register('count', 'sub', hardware=hardware, hardware_timing=Cycles(50_000_000))\n"
+        "    app.spin()\n"
+    )
+    given = ("--profile", "zcu104", "--mapping", "hardware", "--input", "/word", "--seconds", 1.95)
+    told = json.loads(run(project, tmp_path / "out", "--json", *given))["mappings"]["hardware"]
+    assert told["dropped"] > 10
+    (gateway,) = told["status"]["gateways"]
+    assert gateway["to_hmt"] + told["dropped"] == pytest.approx(19, abs=2)  # two are on their way
+
+
 def test_where_nothing_leaves_the_board_nothing_is_drawn(tmp_path: Path) -> None:
     (tmp_path / "compare.png").write_text("of an earlier run")
     shown = run(application_folder(), tmp_path, "--seconds", 0.1, "--mapping", "mixed")

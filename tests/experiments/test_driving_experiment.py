@@ -347,6 +347,14 @@ def test_a_profile_without_topics_is_refused(profile: str) -> None:
         check_profile(read_profile(profile))
 
 
+@pytest.mark.parametrize("section", ["gateway", "hmt"])
+def test_a_profile_without_what_one_of_the_variants_needs_is_refused(section: str) -> None:
+    assert PROFILE.model is not None
+    lacking = PROFILE.model_copy(update={"model": PROFILE.model.model_copy(update={section: None})})
+    with pytest.raises(UsageError, match=rf"Add a section \[model\.{section}\]"):
+        check_profile(lacking)
+
+
 def test_a_picture_of_another_size_is_refused() -> None:
     class Picture:
         encoding, height, width, step, data = "bgr8", 1, 1, 3, b"..."

@@ -13,10 +13,10 @@ import pytest
 from typer.testing import CliRunner
 
 from reconros_zenoh.applications.gateway.nodes import ImagePublisher, random_body, run_nodes
-from reconros_zenoh.board.profile import read_profile
+from reconros_zenoh.board.profile import profile_path, read_profile
 from reconros_zenoh.cli.experiment import app
 from reconros_zenoh.clock.virtual import VirtualEnvironment
-from reconros_zenoh.errors import ExperimentError, UsageError
+from reconros_zenoh.errors import ExperimentError, FileError, UsageError
 from reconros_zenoh.experiments import gateway
 from reconros_zenoh.experiments.gateway import (
     COUNTS,
@@ -127,6 +127,21 @@ def test_a_profile_without_topics_is_refused_and_an_earlier_result_is_kept(tmp_p
     result = run("--profile", "miniitx-zynq7100", "--out", str(tmp_path))
     assert isinstance(result.exception, UsageError)
     assert "does not know what topics inside a board cost" in str(result.exception)
+    assert earlier.read_text() == "{}"
+
+
+@pytest.mark.parametrize("section", ["gateway", "hmt", "callbacks.hardware_7"])
+def test_a_profile_that_lacks_a_time_is_refused_and_an_earlier_result_is_kept(section: str, tmp_path) -> None:
+    shipped = profile_path("zcu104").read_text()
+    lacking = tmp_path / "lacking.toml"
+    parts = shipped.split("\n\n")
+    lacking.write_text("\n\n".join(part for part in parts if not part.startswith(f"[model.{section}]")))
+    assert lacking.read_text() != shipped
+    earlier = tmp_path / "gateway.json"
+    earlier.write_text("{}")
+    result = run("--profile", str(lacking), "--out", str(tmp_path))
+    assert isinstance(result.exception, FileError | UsageError)
+    assert f"[model.{section}]" in str(result.exception)
     assert earlier.read_text() == "{}"
 
 

@@ -47,6 +47,17 @@ def test_the_folder_is_free_again(tmp_path: Path) -> None:
         pass
 
 
+def test_of_a_folder_in_which_nothing_was_written_nothing_is_left(tmp_path: Path) -> None:
+    (tmp_path / "there").mkdir()
+    for folder in ("there", "new/one"):
+        with pytest.raises(ZeroDivisionError), own_folder(tmp_path / folder):
+            raise ZeroDivisionError
+    assert [path.name for path in tmp_path.iterdir()] == ["there"]
+    with own_folder(tmp_path / "new/one"):
+        (tmp_path / "new/one/kept").touch()
+    assert (tmp_path / "new/one/kept").exists()
+
+
 def test_a_folder_in_which_nothing_can_be_written_is_refused_before_anything_is_measured() -> None:
     """Of /proc that holds for root, too."""
     with pytest.raises(UsageError, match=r"/proc cannot be written \(.*\)\. Choose another --out\."):

@@ -18,9 +18,9 @@ MS = 1_000_000
 
 
 class Drive:
-    """A robot that takes some pictures, and a driver that answers what `command` returns for each."""
+    """A robot that takes some pictures, and a driver that answers so much later what `command` returns."""
 
-    def __init__(self, command: Any, pictures: int = 3) -> None:
+    def __init__(self, command: Any, pictures: int = 3, after_ns: int = 5 * MS) -> None:
         self.environment, types = VirtualEnvironment(), TypeRegistry()
         network = SimulatedNetwork(self.environment)
         self.here, there = (
@@ -46,7 +46,7 @@ class Drive:
                 stamped = publisher.message_type.cls(
                     header=header(stamp=picture.stamp, frame_id=number), twist=motion
                 )
-                self.environment.call_later(5 * MS, publisher.publish, stamped)
+                self.environment.call_later(after_ns, publisher.publish, stamped)
 
         driver.subscription(types.message("sensor_msgs/msg/Image"), "/image_raw", answer)
         self.environment.run(until=self.robot.done)
@@ -65,6 +65,14 @@ def test_it_drives_as_it_is_told_and_notes_how_long_it_took() -> None:
 def test_a_picture_without_a_command_is_lost() -> None:
     drive = Drive(lambda name: None if name == "a1.1" else (name, 0.0, 0.0))
     assert [(trip.index, trip.outcome) for trip in drive.trips] == [(0, "ok"), (2, "ok"), (1, "lost")]
+
+
+def test_what_is_lost_at_the_end_is_not_answered_as_well() -> None:
+    drive = Drive(lambda name: (name, 1.0, 0.0), after_ns=2150 * MS)
+    assert [(trip.index, trip.outcome) for trip in drive.trips] == [(0, "ok"), (1, "ok"), (2, "lost")]
+    drive.environment.run(until=3000 * MS)
+    assert len(drive.trips) == 3
+    assert (drive.robot.unanswered, drive.robot.unexpected) == (1, 0)
 
 
 @pytest.mark.parametrize("number", ["a1.7", "", "0", "b2.0", "a1.0"])

@@ -60,7 +60,7 @@ def test_every_line_is_on_disk_before_the_next(tmp_path):
 @given(
     st.lists(times_ms, min_size=1, max_size=30),
     st.sampled_from([";\n", "\n", ",\n", ";", ",", " ; ", "\r\n", ";\r\n", "\n\n"]),
-    st.sampled_from(["", "Periodic", "Round trip [ms]"]),
+    st.sampled_from(["", "Periodic", "Round trip [ms]", "latency_ms"]),
     st.booleans(),
 )
 def test_foreign_files_keep_every_value(tmp_path_factory, values, separator, header, ended):
@@ -106,6 +106,7 @@ def test_a_record_without_any_round_trip_is_empty(tmp_path):
     [
         ("Sort;\n1.0;\nabc;\n2.0;", 3, "'abc'"),
         ("Sort;\nMore;\n1.0;", 2, "'More'"),
+        ("692ms\n1.0\n", 1, "'692ms'"),
         ("1.0\n-2.0\n", 2, "'-2.0'"),
         ("inf\n1.0\n", 1, "'inf'"),
         ("1.0\ninf\n", 2, "'inf'"),

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from reconros_zenoh.measure.statistics import format_error, format_ms, format_speedup, summarise
+from reconros_zenoh.measure.statistics import format_error, format_ms, format_part, format_speedup, summarise
 
 NAMES = [
     "n",
@@ -44,5 +44,13 @@ def test_without_answers_there_are_no_times():
 
 def test_figures_are_written_for_people():
     assert [format_ms(v) for v in (None, 2.634, 99.99, 100.04)] == ["-", "2.63", "99.99", "100.0"]
+    assert [format_ms(v) for v in (0.1, 0.0123, 0.0032, 1e-6, 0.0)] == [
+        "0.10",
+        "0.012",
+        "0.0032",
+        "0.000001",
+        "0.00",
+    ]
+    assert [format_part(v) for v in (None, 0.0032, 2.634, 100.04)] == ["-", "0.00", "2.63", "100.0"]
     assert [format_error(v) for v in (None, 0.0312, -0.5)] == ["-", "+3.1 %", "-50.0 %"]
     assert [format_speedup(v) for v in (None, 19.647)] == ["-", "19.65"]

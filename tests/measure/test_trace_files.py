@@ -73,6 +73,18 @@ def test_the_drawing_has_a_line_per_track_and_the_last_second() -> None:
     ]
 
 
+def test_each_of_many_callbacks_has_a_colour_of_its_own() -> None:
+    trace = Trace(VirtualEnvironment(0))
+    worker = trace.add_slot(0)
+    names = [f"callback_{number:02}" for number in range(40)]
+    for name in names:
+        worker.begin(name)
+        worker.end()
+    (legend,) = trace_figure("board7", trace).legends
+    patches = dict(zip((text.get_text() for text in legend.get_texts()), legend.get_patches(), strict=True))
+    assert len({patches[name].get_facecolor() for name in names}) == len(names)
+
+
 @pytest.mark.parametrize("suffix", ["png", "svg"])
 def test_a_trace_is_drawn_to_a_file_also_where_nothing_happened(tmp_path: Path, suffix: str) -> None:
     for name, trace in {"some": one_call(), "none": Trace(VirtualEnvironment(0))}.items():

