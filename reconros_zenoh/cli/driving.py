@@ -13,7 +13,7 @@ from reconros_zenoh.cli.console import interrupted, new_table, wide_console
 from reconros_zenoh.cli.options import AsJson, Out, Profile
 from reconros_zenoh.cli.progress import run_bar
 from reconros_zenoh.experiments.provenance import own_folder, write_experiment, writing
-from reconros_zenoh.measure.statistics import format_error, format_ms, format_part
+from reconros_zenoh.measure.statistics import format_error, format_part
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -114,7 +114,7 @@ def _print(console: Console, experiment: dict[str, Any], troubles: list[str]) ->
     for section in next(iter(variants))["sections_ms"]:
         table.add_row(section, *(format_part(variant["sections_ms"][section]) for variant in variants))
     for key, text in _ROWS.items():
-        table.add_row(text, *(format_ms(variant[key]) for variant in variants))
+        table.add_row(text, *(format_part(variant[key]) for variant in variants))
     console.print(table)
     for anchor in experiment["anchors"]:
         error = format_error(anchor["error"])

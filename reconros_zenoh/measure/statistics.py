@@ -52,7 +52,10 @@ def format_ms(value: float | None) -> str:
 
 
 def format_part(value: float | None) -> str:
-    """Return the time, as a part of others, with two decimals, from 100 ms on with one; `-` for None."""
+    """Return the time, one of several that are compared or added, with two decimals, from 100 ms on with one.
+
+    `-` stands for None.
+    """
     if value is None:
         return "-"
     return f"{value:.{2 if value < 100 else 1}f}"
