@@ -33,10 +33,15 @@ def check_addition(
             f"callback {name!r} has a check, and its source, a {type(source).__name__}, no messages that "
             "could be checked. Leave out `check`."
         )
-    if not isinstance(timing, Cycles | Native | None):
-        raise UsageError(f"timing={timing!r} of callback {name!r}: write Cycles(n) or Native(factor).")
+    check_timing(name, timing)
     if isinstance(function, Kernel):
         _check_kernel(name, kind, source, function)
+
+
+def check_timing(name: str, timing: object) -> None:
+    """Raise UsageError unless a callback can be said to take this long; None says nothing."""
+    if not isinstance(timing, Cycles | Native | None):
+        raise UsageError(f"timing={timing!r} of callback {name!r}: write Cycles(n) or Native(factor).")
 
 
 def _check_kernel(name: str, kind: CallbackKind, source: Source, kernel: Kernel) -> None:
