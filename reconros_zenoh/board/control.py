@@ -35,6 +35,8 @@ def check_board_name(name: str) -> None:
     """Raise UsageError for what cannot name a board."""
     if not is_name(name):
         raise UsageError(f"{name!r} cannot name a board. Use letters, digits, `-`, `_` and `.`.")
+    if name == "router":
+        raise UsageError("'router' cannot name a board: it is what `reconros status router` asks for.")
 
 
 def alive_key(board: str) -> str:
