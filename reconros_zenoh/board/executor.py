@@ -178,6 +178,7 @@ class Executor:
         }
         board.zycap.init(read_bitstreams(self._bitstreams, wanted.values()) if self._bitstreams else wanted)
         self._is_spinning = True
+        board.executors.append(self)
         for name, registration in self._registrations.items():
             slots = {
                 slot: HardwareImplementation(self._bitstream(slot, name), *implementation)
@@ -204,6 +205,10 @@ class Executor:
             registration.source.open(
                 partial(self._became_ready, entry), check, in_hardware=bool(registration.slots)
             )
+
+    def close(self) -> None:
+        """Begin no callback any more; those that run go on to their end."""
+        self._policy.close()
 
     @property
     def awaits_spin(self) -> bool:
