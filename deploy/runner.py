@@ -129,7 +129,9 @@ class LocalRunner:
     def stop(self) -> None:
         """Stop all services; each one gets SIGTERM when those that depend on it are gone.
 
-        It gets SIGKILL after the limit, or at once when a second signal shows that the user is in a hurry.
+        One that is stopped (SIGSTOP) would not hear that, and keep others that take leave of it: before, all
+        get SIGCONT. SIGKILL comes after the limit, or at once when a second signal shows that the user is in
+        a hurry.
         """
         with self._signals.held():
             try:
@@ -188,6 +190,8 @@ class LocalRunner:
         self._alarm.ring()
 
     def _stop(self) -> None:
+        for run in self._runs.values():
+            run.resume()
         while True:
             living = [run for run in self._runs.values() if run.living]
             needed = {name for run in living for name in run.service.depends_on}

@@ -127,6 +127,11 @@ class ServiceRun:
         elif self.service.healthcheck is not None:
             self._begin_check(self.service.healthcheck, now_ns)
 
+    def resume(self) -> None:
+        """Let its process go on if it is stopped."""
+        if self._child is not None:
+            self._child.send_signal(signal.SIGCONT)
+
     def stop(self, limit_ns: int) -> None:
         """Send SIGTERM, and have `act` send SIGKILL after the limit; one that waits to start never will."""
         if self._stopping:

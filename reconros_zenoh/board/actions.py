@@ -86,6 +86,7 @@ class ActionClientSource(Source):
     """
 
     kind = CallbackKind.CLT
+    checks = False
 
     def __init__(self, board: Board, node: Node, action_type: ActionType, name: str) -> None:
         super().__init__()

@@ -9,7 +9,9 @@ from reconros_zenoh.errors import UsageError
 from reconros_zenoh.executor.callbacks import CallbackKind
 
 
-def check_addition(name: str, kind: object, source: object, function: object, timing: object) -> None:
+def check_addition(
+    name: str, kind: object, source: object, function: object, check: object, timing: object
+) -> None:
     """Raise UsageError unless a callback can be added with these."""
     if not callable(function):
         raise UsageError(f"callback {name!r} is {function!r}, which cannot be called. Give a function.")
@@ -26,10 +28,20 @@ def check_addition(name: str, kind: object, source: object, function: object, ti
             f"callback {name!r} is of the kind {kind.name}, and its source, a {type(source).__name__}, of "
             f"the kind {source.kind.name}. Give rz.{source.kind.name}, or another source."
         )
-    if not isinstance(timing, Cycles | Native | None):
-        raise UsageError(f"timing={timing!r} of callback {name!r}: write Cycles(n) or Native(factor).")
+    if check is not None and not source.checks:
+        raise UsageError(
+            f"callback {name!r} has a check, and its source, a {type(source).__name__}, no messages that "
+            "could be checked. Leave out `check`."
+        )
+    check_timing(name, timing)
     if isinstance(function, Kernel):
         _check_kernel(name, kind, source, function)
+
+
+def check_timing(name: str, timing: object) -> None:
+    """Raise UsageError unless a callback can be said to take this long; None says nothing."""
+    if not isinstance(timing, Cycles | Native | None):
+        raise UsageError(f"timing={timing!r} of callback {name!r}: write Cycles(n) or Native(factor).")
 
 
 def _check_kernel(name: str, kind: CallbackKind, source: Source, kernel: Kernel) -> None:

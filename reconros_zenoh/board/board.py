@@ -28,6 +28,7 @@ from reconros_zenoh.ros.qos import QosProfile
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from reconros_zenoh.board.executor import Executor
     from reconros_zenoh.board.profile import Profile
     from reconros_zenoh.clock.virtual import VirtualEnvironment
     from reconros_zenoh.rmw.node import Context, Node
@@ -106,6 +107,7 @@ class Board:
         self.writers: list[TopicWriter] = []
         self.hardware_topics: dict[str, HardwareTopic] = {}
         self.gateways: list[Gateway] = []
+        self.executors: list[Executor] = []
         self._tap = tap
         self._taps: list[Publisher] = []
         self.slots: Mapping[int, Slot] = {
@@ -195,7 +197,9 @@ class Board:
         return gateway
 
     def close(self) -> None:
-        """Let running computations end; the board does nothing any more."""
+        """Let running computations end; the board begins nothing any more."""
+        for executor in self.executors:
+            executor.close()
         for end in (*self.gateways, *self._taps):
             end.close()
         if self.topics is not None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import reprlib
 from dataclasses import dataclass
 from functools import partial
+from operator import index
 from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar, overload
 
 import numpy as np
@@ -135,12 +136,13 @@ class HardwareThread(DelegateCalls):
         if isinstance(source, np.ndarray):
             data: Array = source
         else:
-            if size is None:
+            try:
+                source, size = index(source), index(size)  # type: ignore[arg-type] # None is none
+            except TypeError:
                 raise UsageError(
-                    f"mem_read of a {type(source).__name__} without a size: give an array, which of a field "
-                    'that is a number is message.array("field"), or an address and how many bytes.'
-                )
-            source = int(source)
+                    f"mem_read of a {type(source).__name__} with the size {size!r}: give an array, which "
+                    'of a field that is a number is message.array("field"), or an address and how many bytes.'
+                ) from None
             # What the slot holds does not change with the memory.
             data = self._mapped(source, size).view(dtype).copy()
         if not (self._in_slot and isinstance(self._message, InitData) and self._message.holds(source)):

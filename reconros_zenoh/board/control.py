@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import re
 from contextlib import closing
 from queue import SimpleQueue
 from threading import Event
@@ -16,6 +15,7 @@ from reconros_zenoh.board.answers import VERSION, StatusAnswer
 from reconros_zenoh.board.status import status
 from reconros_zenoh.clock.wall import WallEnvironment
 from reconros_zenoh.errors import TransportError, UsageError
+from reconros_zenoh.transport.base import is_name
 
 if TYPE_CHECKING:
     from pydantic import BaseModel
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
 
 _log = logging.getLogger(__name__)
 
-_NAME = re.compile(r"[A-Za-z0-9_.-]+")  # one part of a key
 _HOST_ANEW = b"host anew"
 _ANSWER_NS = 2_000_000_000
 _LONGEST_ANSWER = 10_000_000
@@ -34,8 +33,10 @@ _LONGEST_ANSWER = 10_000_000
 
 def check_board_name(name: str) -> None:
     """Raise UsageError for what cannot name a board."""
-    if not _NAME.fullmatch(name):
+    if not is_name(name):
         raise UsageError(f"{name!r} cannot name a board. Use letters, digits, `-`, `_` and `.`.")
+    if name == "router":
+        raise UsageError("'router' cannot name a board: it is what `reconros status router` asks for.")
 
 
 def alive_key(board: str) -> str:

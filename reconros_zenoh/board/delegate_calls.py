@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, TypeVar
 
 from reconros_zenoh.board.noted_calls import NotedCalls, noted
+from reconros_zenoh.board.os_resources import Condition, Mailbox, Mutex, Semaphore, checked
 
 if TYPE_CHECKING:
     from collections.abc import Generator
 
-    from reconros_zenoh.board.os_resources import Condition, Mailbox, Mutex, Semaphore
     from reconros_zenoh.board.osif import Osif
     from reconros_zenoh.board.spans import Timeline
     from reconros_zenoh.clock.activity import Awaitable
@@ -21,6 +21,7 @@ class DelegateCalls(NotedCalls):
     """The calls of ReconOS to mailboxes, mutexes, conditions and semaphores: base of `HardwareThread`.
 
     Each costs one call through the delegate thread (stage `osif`); what a call waits for counts as `blocked`.
+    UsageError for what is no object of its kind.
     """
 
     def __init__(self, osif: Osif, timeline: Timeline) -> None:
@@ -33,75 +34,75 @@ class DelegateCalls(NotedCalls):
     def mbox_get(self, mailbox: Mailbox) -> Generator[Awaitable, object, int]:
         """Remove the oldest word, once there is one, and return it: MBOX_GET."""
         yield from self._call()
-        return (yield from self._blocked("a word in a mailbox", mailbox.get()))
+        return (yield from self._blocked("a word in a mailbox", checked(Mailbox, mailbox).get()))
 
     @noted
     def mbox_put(self, mailbox: Mailbox, word: int) -> Generator[Awaitable, object, None]:
         """Append a word once there is room: MBOX_PUT."""
         yield from self._call()
-        yield from self._blocked("room in a mailbox", mailbox.put(word))
+        yield from self._blocked("room in a mailbox", checked(Mailbox, mailbox).put(word))
 
     @noted
     def mbox_tryget(self, mailbox: Mailbox) -> Generator[Awaitable, object, int | None]:
         """Remove the oldest word and return it, or None: MBOX_TRYGET."""
         yield from self._call()
-        return mailbox.try_get()
+        return checked(Mailbox, mailbox).try_get()
 
     @noted
     def mbox_tryput(self, mailbox: Mailbox, word: int) -> Generator[Awaitable, object, bool]:
         """Append a word and return True, or return False: MBOX_TRYPUT."""
         yield from self._call()
-        return mailbox.try_put(word)
+        return checked(Mailbox, mailbox).try_put(word)
 
     @noted
     def mutex_lock(self, mutex: Mutex) -> Generator[Awaitable, object, None]:
         """Hold the mutex once nobody else does: MUTEX_LOCK."""
         yield from self._call()
-        self._mutexes[mutex] = None
+        self._mutexes[checked(Mutex, mutex)] = None
         yield from self._blocked("a mutex", mutex.lock(self))
 
     @noted
     def mutex_trylock(self, mutex: Mutex) -> Generator[Awaitable, object, bool]:
         """Hold the mutex and return True, or return False: MUTEX_TRYLOCK."""
         yield from self._call()
-        self._mutexes[mutex] = None
+        self._mutexes[checked(Mutex, mutex)] = None
         return mutex.try_lock(self)
 
     @noted
     def mutex_unlock(self, mutex: Mutex) -> Generator[Awaitable, object, None]:
         """Let others have the mutex: MUTEX_UNLOCK."""
         yield from self._call()
-        mutex.unlock(self)
+        checked(Mutex, mutex).unlock(self)
 
     @noted
     def cond_wait(self, condition: Condition) -> Generator[Awaitable, object, None]:
         """Let others have the mutex, wait for a signal, and hold the mutex again: COND_WAIT."""
         yield from self._call()
-        yield from self._blocked("a condition", condition.wait(self))
+        yield from self._blocked("a condition", checked(Condition, condition).wait(self))
 
     @noted
     def cond_signal(self, condition: Condition) -> Generator[Awaitable, object, None]:
         """Let one that waits go on: COND_SIGNAL."""
         yield from self._call()
-        condition.signal()
+        checked(Condition, condition).signal()
 
     @noted
     def cond_broadcast(self, condition: Condition) -> Generator[Awaitable, object, None]:
         """Let all that wait go on: COND_BROADCAST."""
         yield from self._call()
-        condition.broadcast()
+        checked(Condition, condition).broadcast()
 
     @noted
     def sem_wait(self, semaphore: Semaphore) -> Generator[Awaitable, object, None]:
         """Count down once the semaphore is above 0: SEM_WAIT."""
         yield from self._call()
-        yield from self._blocked("a semaphore", semaphore.wait())
+        yield from self._blocked("a semaphore", checked(Semaphore, semaphore).wait())
 
     @noted
     def sem_post(self, semaphore: Semaphore) -> Generator[Awaitable, object, None]:
         """Count up: SEM_POST."""
         yield from self._call()
-        semaphore.post()
+        checked(Semaphore, semaphore).post()
 
     def release_mutexes(self) -> None:
         """Let others have every mutex that is still held: the call has ended, maybe with an error."""

@@ -112,7 +112,7 @@ class Executor:
         """
         if isinstance(source, HmtSource):
             raise UsageError(f"callback {name!r} reads a hardware-mapped topic: it cannot run in software.")
-        self._check_addition(name, kind, source, function, timing)
+        self._check_addition(name, kind, source, function, check, timing)
         if not is_plain(function):
             raise UsageError(
                 f"callback {name!r} has `yield` or `async`: in software it would never run. Give a plain "
@@ -141,7 +141,7 @@ class Executor:
         One that is not reconfigurable holds it from the start, and no other callback can be added to it; none
         can be added to one with a gateway.
         """
-        self._check_addition(name, kind, source, thread, timing)
+        self._check_addition(name, kind, source, thread, check, timing)
         slots = list(slots) if isinstance(slots, Iterable) else []
         if not slots:
             raise UsageError(f"callback {name!r} has no slots to run in. Give their ids: [0].")
@@ -178,6 +178,7 @@ class Executor:
         }
         board.zycap.init(read_bitstreams(self._bitstreams, wanted.values()) if self._bitstreams else wanted)
         self._is_spinning = True
+        board.executors.append(self)
         for name, registration in self._registrations.items():
             slots = {
                 slot: HardwareImplementation(self._bitstream(slot, name), *implementation)
@@ -204,6 +205,10 @@ class Executor:
             registration.source.open(
                 partial(self._became_ready, entry), check, in_hardware=bool(registration.slots)
             )
+
+    def close(self) -> None:
+        """Begin no callback any more; those that run go on to their end."""
+        self._policy.close()
 
     @property
     def awaits_spin(self) -> bool:
@@ -271,9 +276,9 @@ class Executor:
         }
 
     def _check_addition(
-        self, name: str, kind: object, source: object, function: object, timing: object
+        self, name: str, kind: object, source: object, function: object, check: object, timing: object
     ) -> None:
-        check_addition(name, kind, source, function, timing)
+        check_addition(name, kind, source, function, check, timing)
         if self._is_spinning:
             raise UsageError(
                 f"callback {name!r} is added to an executor that spins already. Call spin() last."

@@ -11,14 +11,16 @@ Threads: whatever does not wait may be called from any thread; waiting belongs t
 
 from __future__ import annotations
 
+import reprlib
 import threading
 from collections import deque
 from dataclasses import dataclass
+from functools import partial
 from operator import index
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 from reconros_zenoh.clock.activity import Signal
-from reconros_zenoh.errors import CallbackError
+from reconros_zenoh.errors import CallbackError, UsageError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator
@@ -28,6 +30,18 @@ if TYPE_CHECKING:
 
     from reconros_zenoh.clock.activity import Awaitable
     from reconros_zenoh.clock.virtual import VirtualEnvironment
+
+R = TypeVar("R")
+
+
+def checked(kind: type[R], given: object) -> R:
+    """Return what a callback has given for an object of this kind; raise UsageError unless it is one."""
+    if isinstance(given, kind):
+        return given
+    raise UsageError(
+        f"{reprlib.repr(given)} is no {kind.__name__}. Give a resource of build.cfg, as app.mbox, app.mutex, "
+        "app.cond or app.sem returns it."
+    )
 
 
 class _Waiters:
@@ -70,12 +84,14 @@ class Mailbox:
         self._putters = _Waiters(environment)
 
     def try_put(self, word: int) -> bool:
-        """Append a word; False when the mailbox is full."""
+        """Append a word; False when the mailbox is full. UsageError for what is no whole number."""
+        return self._try_append(_word(word))
+
+    def _try_append(self, word: int) -> bool:
         with self._lock:
             if len(self._words) >= self._size:
                 return False
-            # One of an array may have a type that the mask does not fit.
-            self._words.append(index(word) & 0xFFFF_FFFF)
+            self._words.append(word)
         self._getters.tell()
         return True
 
@@ -89,8 +105,8 @@ class Mailbox:
         return word
 
     def put(self, word: int) -> Generator[Awaitable, object, None]:
-        """Append a word once there is room."""
-        return self._putters.until(lambda: self.try_put(word))
+        """Append a word once there is room; raise UsageError as `try_put`, also where there is none."""
+        return self._putters.until(partial(self._try_append, _word(word)))
 
     def get(self) -> Generator[Awaitable, object, int]:
         """Remove the oldest word, once there is one, and return it."""
@@ -104,6 +120,14 @@ class Mailbox:
 
         yield from self._getters.until(attempt)
         return words[0]
+
+
+def _word(given: int) -> int:
+    try:
+        # One of an array may have a type that the mask does not fit.
+        return index(given) & 0xFFFF_FFFF
+    except TypeError:
+        raise UsageError(f"{reprlib.repr(given)} is no word of a mailbox. Give a whole number.") from None
 
 
 class Mutex:

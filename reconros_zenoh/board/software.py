@@ -7,6 +7,7 @@ from functools import partial
 from inspect import isasyncgenfunction, iscoroutinefunction, isgeneratorfunction
 from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 
+from reconros_zenoh.board.os_resources import Condition, Mailbox, Mutex, Semaphore, checked
 from reconros_zenoh.board.timing import Native
 from reconros_zenoh.errors import CallbackError
 
@@ -18,7 +19,6 @@ if TYPE_CHECKING:
     from reconros_zenoh.board.clients import ClientSource
     from reconros_zenoh.board.host import Limit
     from reconros_zenoh.board.log import BoardLog
-    from reconros_zenoh.board.os_resources import Condition, Mailbox, Mutex, Semaphore
     from reconros_zenoh.board.spans import Timeline
     from reconros_zenoh.board.timing import ExecutionTime
     from reconros_zenoh.board.writers import MessageWriter
@@ -116,18 +116,18 @@ class SoftwareContext:
 
     def mbox_tryget(self, mailbox: Mailbox) -> int | None:
         """Remove the oldest word and return it, or None."""
-        return mailbox.try_get()
+        return checked(Mailbox, mailbox).try_get()
 
     def mbox_tryput(self, mailbox: Mailbox, word: int) -> bool:
         """Append a word and return True, or return False."""
-        return mailbox.try_put(word)
+        return checked(Mailbox, mailbox).try_put(word)
 
     def mutex_trylock(self, mutex: Mutex) -> bool:
         """Hold the mutex, until the callback ends at the latest, and return True; or return False.
 
         Raises CallbackError in a function that runs on although its call is over its limit.
         """
-        self._mutexes[mutex] = None
+        self._mutexes[checked(Mutex, mutex)] = None
         locked = mutex.try_lock(self)
         # Asked after it is locked: either this sees that the call is over, or its end sees the mutex.
         if self._is_over:
@@ -137,23 +137,23 @@ class SoftwareContext:
 
     def mutex_unlock(self, mutex: Mutex) -> None:
         """Let others have the mutex."""
-        mutex.unlock(self)
+        checked(Mutex, mutex).unlock(self)
 
     def cond_signal(self, condition: Condition) -> None:
         """Let one that waits go on."""
-        condition.signal()
+        checked(Condition, condition).signal()
 
     def cond_broadcast(self, condition: Condition) -> None:
         """Let all that wait go on."""
-        condition.broadcast()
+        checked(Condition, condition).broadcast()
 
     def sem_trywait(self, semaphore: Semaphore) -> bool:
         """Count down and return True, or return False."""
-        return semaphore.try_wait()
+        return checked(Semaphore, semaphore).try_wait()
 
     def sem_post(self, semaphore: Semaphore) -> None:
         """Count up."""
-        semaphore.post()
+        checked(Semaphore, semaphore).post()
 
     def release_mutexes(self) -> None:
         """Let others have every mutex that is still held: the call has ended, maybe with an error."""

@@ -55,11 +55,13 @@ class Event(NamedTuple):
 class Source:
     """What makes a callback ready: a queue of events, the last `depth` of them (None: all).
 
-    `kind` is that of its callbacks, None where it may be any; `message_type` as in its events.
+    `kind` is that of its callbacks, None where it may be any; `message_type` as in its events; `checks` says
+    whether there is anything that a callback's `check` could refuse.
     """
 
     kind: CallbackKind | None = None
     message_type: MessageType | None = None
+    checks = True
 
     def __init__(self, depth: int | None = None) -> None:
         self._queue: deque[Event] = deque(maxlen=depth)
@@ -266,6 +268,7 @@ class TimerSource(Source):
     """
 
     kind = CallbackKind.TMR
+    checks = False
 
     def __init__(self, board: Board, period_ns: int) -> None:
         super().__init__()

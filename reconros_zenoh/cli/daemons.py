@@ -139,7 +139,7 @@ def status(
 
     Exit status 2 when it does not answer.
     """
-    with ZenohTransport.open(router) as transport:
+    with ZenohTransport.open(router, as_client=True) as transport:
         answer = {"router": router} if name == "router" else ask_status(transport, name)
     if as_json:
         print(json.dumps(answer))

@@ -95,7 +95,7 @@ def gateway(
         }
     elif smt is not None or message_type is not None or name is not None or qos:
         raise UsageError("a gateway needs its hardware-mapped topic. Add --hmt TOPIC.")
-    with ZenohTransport.open(router) as transport:
+    with ZenohTransport.open(router, as_client=True) as transport:
         if add is not None:
             check_type(transport, ask_status(transport, board)["domain"], add["smt"], add["type"])
         answer = ask_gateways(transport, board, add)

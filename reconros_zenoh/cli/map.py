@@ -154,7 +154,7 @@ def _read_live(router: str, domain: int, hardware: list[str], source: Path | Non
     from reconros_zenoh.mapping.live_graph import read_live_graph
     from reconros_zenoh.transport.zenoh import ZenohTransport
 
-    with ZenohTransport.open(router) as transport:
+    with ZenohTransport.open(router, as_client=True) as transport:
         return read_live_graph(transport, domain, hardware)
 
 

@@ -10,12 +10,20 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from reconros_zenoh.transport.base import is_name
+
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
 
 ENDPOINT = "tcp/127.0.0.1:7447"
 """Where rmw_zenoh's router listens, and ours."""
+
+
+def _checked_group(name: str | None) -> str | None:
+    if name is not None and not is_name(name):
+        raise typer.BadParameter(f"{name!r} cannot name a group. Use letters, digits, `-`, `_` and `.`.")
+    return name
 
 
 class ClockName(StrEnum):
@@ -53,7 +61,10 @@ MappingName = Annotated[
 BoardName = Annotated[str, typer.Option(help="The board's name in the network.")]
 ModelSeed = Annotated[int, typer.Option(min=0, help="Seed of what is random in the model.")]
 Group = Annotated[
-    str | None, typer.Option(help="Begin together with the others of this group.", show_default=False)
+    str | None,
+    typer.Option(
+        help="Begin together with the others of this group.", show_default=False, callback=_checked_group
+    ),
 ]
 Members = Annotated[int, typer.Option(min=1, help="How many members the group has.")]
 Bitstreams = Annotated[

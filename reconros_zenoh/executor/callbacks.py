@@ -9,10 +9,10 @@ from enum import IntEnum
 from itertools import chain
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
+from reconros_zenoh.executor.resource_mask import ResourceMask
+
 if TYPE_CHECKING:
     from collections.abc import Iterator
-
-    from reconros_zenoh.executor.resource_mask import ResourceMask
 
 
 class CallbackKind(IntEnum):
@@ -114,6 +114,12 @@ class CallbackLists(ABC):
         """Note that the dispatched callback has run to completion."""
         dispatch.entry.running = False
         self.refresh(dispatch.entry)
+
+    def close(self) -> None:
+        """Let no callback become ready any more."""
+        for entry in self:
+            entry.mask = ResourceMask({})
+        self._ready.clear()
 
 
 def lowest(bits: int) -> int:

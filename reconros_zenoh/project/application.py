@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, TypeVar, cast
 import numpy as np
 
 from reconros_zenoh.board.actions import ActionClientSource, ActionSource
+from reconros_zenoh.board.additions import check_timing
 from reconros_zenoh.board.clients import ClientSource
 from reconros_zenoh.board.executor import Executor
 from reconros_zenoh.board.hmt import HmtSource, HmtWriter
@@ -194,6 +195,15 @@ class Application:
                 f"{', '.join(groups) or 'none'}. Correct the name, or `ResourceGroup` of "
                 f"[ReconosThread@{name}] in build.cfg."
             )
+        for side, function, timing in (
+            ("software", software, software_timing),
+            ("hardware", hardware, hardware_timing),
+        ):
+            check_timing(name, timing)  # also where this mapping does not need it
+            if function is None and timing is not None:
+                raise UsageError(
+                    f"callback {name!r} has {side}_timing, but no `{side}` that takes it. Give both or none."
+                )
         source = self.source(group, resource, qos)
         kind = _required(source.kind)
         executor = self._mapped = self._mapped or self._mapped_executor()

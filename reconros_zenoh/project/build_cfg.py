@@ -276,6 +276,11 @@ def _thread(
     groups: Collection[str],
     warnings: list[str],
 ) -> ReconosThread:
+    if "/" in name:
+        raise section.error(
+            f"{section} cannot have a `/` in its name, which is part of its bitstreams' file names.",
+            "Rename it, also in main.py and the mappings.",
+        )
     return ReconosThread(
         name=name,
         slots=read_slot_ids(section, slots, warnings),

@@ -12,6 +12,7 @@ key that is not a key expression.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, NamedTuple, Protocol, Self, TypeAlias
 
@@ -29,6 +30,13 @@ single one may reach its reader by reference."""
 
 OnMatching: TypeAlias = Callable[[bool], None]
 """Gets whether there is a counterpart: the present state at once, then each change."""
+
+_NAME = re.compile(r"[A-Za-z0-9_.-]+")
+
+
+def is_name(text: str) -> bool:
+    """Tell whether a name can be one part of a key of ours: letters, digits, `-`, `_` and `.`."""
+    return _NAME.fullmatch(text) is not None
 
 
 class Sample(NamedTuple):

@@ -82,15 +82,16 @@ class ZenohTransport(Closing):
         self._kept_keys: dict[str, zenoh.KeyExpr] = {}
 
     @classmethod
-    def open(cls, router: str, *, timeout_s: float = 3.0) -> Self:
+    def open(cls, router: str, *, timeout_s: float = 3.0, as_client: bool = False) -> Self:
         """Return a session that is connected to `router`, for which it waits at most `timeout_s`.
 
-        With a router on the loopback it is a peer, as in rmw_zenoh. With any other it is a client,
-        which listens nowhere: the router passes everything on.
+        With a router on the loopback it is a peer, as in rmw_zenoh. With any other, or `as_client`, it is a
+        client, which listens nowhere: the router passes everything on. Whoever only asks is a client: a peer
+        hears nothing of one that has stopped, which the router knows, and its end waits 10 s for it.
         Raises TransportError when no router answers or this host lacks something, UsageError when `router` is
         not an endpoint.
         """
-        if is_of_this_host(router):
+        if is_of_this_host(router) and not as_client:
             config = configuration(
                 "peer", {"connect/endpoints": router, "listen/endpoints": "tcp/127.0.0.1:0"}
             )

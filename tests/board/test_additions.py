@@ -138,6 +138,25 @@ def test_what_is_no_qos(qos: Any) -> None:
         assert str(caught.value) == f"qos is {qos!r}. Write a QosProfile: QosProfile(depth=10)."
 
 
+@pytest.mark.parametrize(
+    ("source", "kind", "told"), [("timer", TMR, "TimerSource"), ("action client", CLT, "ActionClientSource")]
+)
+def test_a_check_where_there_is_nothing_to_check(source: str, kind: CallbackKind, told: str) -> None:
+    refused = f"callback 'a' has a check, and its source, a {told}, no messages that could be checked. "
+    assert Case().refusal(source, kind, check=ignore).startswith(refused)
+    case = Case()
+    with pytest.raises(UsageError, match="Leave out `check`"):
+        case.executor.add_sw_callback("a", kind, case.sources[source], ignore, ignore)
+
+
+@pytest.mark.parametrize(
+    ("source", "kind"),
+    [("subscription", SUB), ("stream", SUB), ("service", SRV), ("client", CLT), ("action", SRV)],
+)
+def test_a_check_where_messages_come(source: str, kind: CallbackKind) -> None:
+    Case().add(source, kind, check=ignore)
+
+
 def kernel(case: Case, *reads: str, publish: bool = True) -> Kernel:
     return Kernel(np.sum, reads, lambda _, __: None, case.writer if publish else None)
 

@@ -18,6 +18,8 @@ from reconros_zenoh.executor.callbacks import CallbackKind
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from reconros_zenoh.board.executor import ExecutorKind
+
 PROFILE = small_profile({"a": (10, 10), "b": (10, 10)})
 SUB = CallbackKind.SUB
 
@@ -231,6 +233,22 @@ def test_a_closed_board_holds_no_bitstream() -> None:
     loaded.board.close()
     with pytest.raises(UsageError, match="no bitstream"):
         loaded.board.zycap.bitstream(0, "a")
+
+
+@pytest.mark.parametrize("kind", ["standard", "reconros"])
+def test_a_closed_board_ends_its_callback_and_begins_no_other(kind: ExecutorKind) -> None:
+    board = small_board(small_profile(dict.fromkeys("ab", (10, 10))))
+    executor = Executor(board, 1, 0, kind=kind)
+    sources = {name: Tickets(board) for name in "ab"}
+    for name, source in sources.items():
+        executor.add_sw_callback(name, SUB, source, ignore)
+        source.put_at(0, 0, 100)
+    executor.spin()
+    board.environment.run(until=5)
+    board.close()
+    board.environment.run(until=200)
+    assert executor.calls == {"a": 1}
+    assert sources["a"].answers == [(0, None)]
 
 
 def test_seed_and_name_decide_which_messages_are_lost() -> None:

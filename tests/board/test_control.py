@@ -395,7 +395,7 @@ def test_a_board_of_another_version(monkeypatch: pytest.MonkeyPatch) -> None:
         ask(packed({"version": 2}), monkeypatch)
 
 
-@pytest.mark.parametrize("name", ["", "a/b", "*", "a b"])
+@pytest.mark.parametrize("name", ["", "a/b", "*", "a b", "router"])
 def test_what_cannot_name_a_board_is_not_asked(name: str) -> None:
     with pytest.raises(UsageError, match="cannot name a board"):
         ask_status(SimulatedNetwork(VirtualEnvironment()).transport("a1"), name)

@@ -167,8 +167,10 @@ NO_TRANSFERS = {
         lambda thread, init: thread.mem_read(init.height),
         r'mem_read of a int .* message\.array\("field"\), or an address',
     ),
-    "an address alone": (lambda thread, init: thread.mem_read(init), "mem_read of a InitData without a size"),
-    "a list to read": (lambda thread, _: thread.mem_read([1, 2]), "mem_read of a list without a size"),
+    "an address alone": (lambda thread, init: thread.mem_read(init), "mem_read of a InitData .*None"),
+    "a list to read": (lambda thread, _: thread.mem_read([1, 2]), "mem_read of a list with the size None"),
+    "no address": (lambda thread, _: thread.mem_read(None, 4), "mem_read of a NoneType with the size 4"),
+    "half bytes": (lambda thread, init: thread.mem_read(init, 4.5), r"mem_read of a InitData .*4\.5"),
     "a number to write": (lambda thread, init: thread.mem_write(5, init), "mem_write of 5: give an array"),
     "a list to write": (lambda thread, _: thread.mem_write([1, 2]), r"mem_write of \[1, 2\]: give an array"),
 }

@@ -14,7 +14,7 @@ from small_board import Tickets, small_board, small_profile, stages, start
 from reconros_zenoh.board.executor import Executor
 from reconros_zenoh.board.os_resources import Condition, Mailbox, Mutex, Semaphore
 from reconros_zenoh.clock.virtual import VirtualEnvironment
-from reconros_zenoh.errors import CallbackError
+from reconros_zenoh.errors import CallbackError, UsageError
 from reconros_zenoh.executor.callbacks import CallbackKind
 
 if TYPE_CHECKING:
@@ -71,6 +71,52 @@ def test_a_word_may_come_out_of_any_array_of_whole_numbers(word: Any, got: int) 
     mailbox = Mailbox(VirtualEnvironment(), 1)
     assert mailbox.try_put(word)
     assert mailbox.try_get() == got
+
+
+KINDS = {"mbox": "Mailbox", "mutex": "Mutex", "cond": "Condition", "sem": "Semaphore"}
+IN_SOFTWARE = (
+    *("mbox_tryget", "mbox_tryput", "mutex_trylock", "mutex_unlock"),
+    *("cond_signal", "cond_broadcast", "sem_trywait", "sem_post"),
+)
+IN_HARDWARE = (
+    *("mbox_get", "mbox_put", "mbox_tryget", "mbox_tryput", "mutex_lock", "mutex_trylock", "mutex_unlock"),
+    *("cond_wait", "cond_signal", "cond_broadcast", "sem_wait", "sem_post"),
+)
+
+
+@pytest.mark.parametrize(
+    ("call", "in_software"), [(call, True) for call in IN_SOFTWARE] + [(call, False) for call in IN_HARDWARE]
+)
+def test_what_is_no_object_of_its_kind_fails_the_callback_in_words(
+    call: str, in_software: bool, caplog: pytest.LogCaptureFixture
+) -> None:
+    arguments = ("x", 1) if "put" in call else ("x",)
+
+    def hardware(thread: HardwareThread) -> Steps:
+        yield from getattr(thread, call)(*arguments)
+
+    def software(_: object, context: SoftwareContext) -> None:
+        getattr(context, call)(*arguments)
+
+    slots = Slots(**({} if in_software else {"a": hardware}))
+    if in_software:
+        slots.sources["a"] = Tickets(slots.board)
+        slots.executor.add_sw_callback("a", SUB, slots.sources["a"], software)
+    slots.run()
+    (record,) = caplog.records
+    assert record.exc_info is not None
+    error = record.exc_info[1]
+    assert isinstance(error, UsageError)
+    assert error.__context__ is None
+    assert str(error).startswith(f"'x' is no {KINDS[call.partition('_')[0]]}. Give a resource of build.cfg")
+
+
+@pytest.mark.parametrize("room", [0, 1])
+def test_what_is_no_word_is_refused_also_by_a_full_mailbox(room: int) -> None:
+    mailbox = Mailbox(VirtualEnvironment(), room)
+    for put in (mailbox.put, mailbox.try_put):
+        with pytest.raises(UsageError, match="'x' is no word of a mailbox"):
+            put("x")  # type: ignore[operator]
 
 
 def test_a_full_mailbox_blocks_and_try_does_not() -> None:

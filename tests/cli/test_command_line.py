@@ -109,6 +109,10 @@ def test_an_error_is_an_object_where_json_is_asked_for() -> None:
             "experiment roundtrip --requests 0",
             "Invalid value for '--requests': Input should be greater than or equal to 1",
         ),
+        (
+            "client sort --group '*'",
+            "Invalid value for '--group': '*' cannot name a group. Use letters, digits, `-`, `_` and `.`.",
+        ),
         ("hist", "Missing argument 'DIR|FILE...'."),
         ("reconstruct", "No such command 'reconstruct'."),
     ],

@@ -200,6 +200,32 @@ def test_the_end_of_the_context_kills_what_ignores_sigterm(services: Services) -
     assert (record.logs / "stubborn.log").read_text() == "here\n"
 
 
+def test_a_stopped_service_goes_on_so_that_it_and_who_needs_it_can_end(services: Services) -> None:
+    os.mkfifo(services.folder / "answer")
+    server = """
+signal.signal(signal.SIGCONT, lambda *_: (folder / 'answer').write_text('bye'))
+write('s')
+block()
+"""
+    client = """
+def end(*_):
+    sys.exit((folder / 'answer').read_text() != 'bye')
+signal.signal(signal.SIGTERM, end)
+write('c')
+block()
+"""
+    record = Recorder(
+        services,
+        services.service("server", server, services.when_written("s")),
+        services.service("client", client, services.when_written("c"), server="healthy"),
+    )
+    with record.runner as runner:
+        runner.wait_until_ready()
+        os.kill(int((services.folder / "server.pid").read_text()), signal.SIGSTOP)
+    services.assert_gone()
+    assert record.events[-2:] == [("client", "stopped"), ("server", "stopped")]
+
+
 def test_dependents_stop_first_and_get_the_time_to_do_so(services: Services) -> None:
     code = """
 def end(*_):

@@ -294,6 +294,7 @@ def test_clients_of_a_group_begin_together() -> None:
         (["reconros router"], r"no boards"),
         ([BOARD, "reconros client sort --domain 3"], r"services\.s1\.command asks in domain 3"),
         ([BOARD, "reconros client sort --group g --members 2"], r"services\.s1\.command waits for 2 clients"),
+        ([BOARD, "reconros client sort --group '*'"], r"services\.s1\.command cannot be run: .*'\*' cannot"),
         ([BOARD, "reconros camera --group g --members 2"], r"services\.s1\.command waits for 2 clients"),
     ],
 )

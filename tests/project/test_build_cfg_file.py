@@ -331,6 +331,7 @@ MISTAKES = {
     "group twice": (HEAD + "[ResourceGroup@g(0:1)]\n[ResourceGroup@g_1]\n", 8, "first in line 7"),
     "group without a name": (HEAD + "[ResourceGroup]\n", 7, "no usable name"),
     "thread twice": (HEAD + "[ReconosThread@t]\n[ReconosThread@t]\n", 8, "first in line 7"),
+    "thread of a name that no file can have": (HEAD + "[ReconosThread@a/b]\n", 7, "a `/` in its name"),
     "thread in an unknown slot": (
         HEAD + SLOT + "[ReconosThread@t]\nSlot = s(0:2)\n",
         10,

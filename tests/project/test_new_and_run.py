@@ -250,7 +250,7 @@ def test_a_folder_that_cannot_be_written(tmp_path: Path) -> None:
         invoke("new", tmp_path / "file" / "blink")
 
 
-@pytest.mark.parametrize("name", ["", "a/b", "a*", "a b"])
+@pytest.mark.parametrize("name", ["", "a/b", "a*", "a b", "router"])
 def test_names_that_a_board_cannot_have(blink: Path, name: str) -> None:
     with pytest.raises(UsageError, match="cannot name a board"):
         run(blink, "--name", name)

@@ -87,6 +87,20 @@ MISTAKES = {
         "makes no callback ready",
     ),
     "no hardware": ("main.py", ", hardware=count.hardware", "", "main.py:8", "mapped to hardware, but no"),
+    "timing of what there is not": (
+        "main.py",
+        "software=count.software",
+        'software_timing=__import__("reconros_zenoh").Cycles(500)',
+        "main.py:8",
+        "callback 'count' has software_timing, but no `software` that takes it",
+    ),
+    "timing that the mapping does not need": (
+        "main.py",
+        "software=count.software",
+        "software=count.software, software_timing=500",
+        "main.py:8",
+        "timing=500 of callback 'count': write Cycles(n) or Native(factor)",
+    ),
     "no spin": ("main.py", "    app.spin()\n", "", "main.py", "does not call app.spin()"),
     "callback after spin": (
         "main.py",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import sys
 from typing import TYPE_CHECKING
 
@@ -46,6 +47,18 @@ def test_a_board_that_is_not_there_is_named(network: Network) -> None:
         "reconros: no board named 'board7' answers. Start it with `reconros board --name board7`, "
         "or name one that runs: board0.\n"
     )
+
+
+def test_a_board_that_is_stopped_is_there_and_does_not_answer(network: Network) -> None:
+    with Process("board", "--router", network.endpoint, "--name", "board1") as board:
+        board.wait_for("serves")
+        os.kill(board.pid, signal.SIGSTOP)
+        try:
+            done = run("status", "board1", "--router", network.endpoint)
+        finally:
+            os.kill(board.pid, signal.SIGCONT)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.startswith("reconros: board 'board1' is running but does not answer")
 
 
 def is_first(pid: int) -> bool:

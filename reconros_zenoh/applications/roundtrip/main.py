@@ -16,15 +16,16 @@ if TYPE_CHECKING:
 
 def main(app: Application) -> None:
     """Register each callback where the mapping wants it, and spin."""
-    callbacks: dict[tuple[str, str], Inverse | Mnist | Sobel | Sort | Hash] = {
+    callbacks: dict[tuple[str, str], Inverse | Mnist | Sobel | Sort] = {
         ("inverse", "sub"): Inverse(app.writer("inverse", "pub")),
         ("mnist", "sub"): Mnist(app.writer("mnist", "pub")),
         ("sobel", "sub"): Sobel(app.writer("sobel", "pub")),
         ("sort", "srv"): Sort(app.types.service("sorter_msgs/srv/Sort").response),
-        ("hash", "tmr"): Hash(app.writer("hash", "pub"), app.types.message("std_msgs/msg/MultiArrayLayout")),
     }
     for (name, resource), callback in callbacks.items():
         app.register(
             name, resource, software=callback.software, hardware=callback.hardware, check=callback.check
         )
+    digests = Hash(app.writer("hash", "pub"), app.types.message("std_msgs/msg/MultiArrayLayout"))
+    app.register("hash", "tmr", software=digests.software, hardware=digests.hardware)
     app.spin()

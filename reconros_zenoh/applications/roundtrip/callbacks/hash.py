@@ -27,9 +27,6 @@ class Hash:
         self._publisher = publisher
         self._layout = layout.cls(dim=[], data_offset=0)
 
-    def check(self, _: Any) -> None:
-        """Accept everything: a timer brings no message."""
-
     def software(self, _: None, context: SoftwareContext) -> None:
         """Publish the digest."""
         context.publish(self._publisher, self._answer(context.compute(sha256, source())))
