@@ -106,7 +106,7 @@ def map_communication(
     if plot:
         print(f"drawn to {plot}")
     if apply:
-        print("\n".join(result["applied"]) or "build.cfg has all of this already")
+        print("\n".join(result["applied"]) or "nothing to add to build.cfg")
 
 
 def _read(
@@ -132,7 +132,7 @@ def _add_project(
     result: dict[str, Any], project: _MappedProject, mappings: Mapping[str, TopicMapping], *, apply: bool
 ) -> None:
     """Add what is to be said of the project; with `apply` write the mapping, and add what that changes."""
-    from reconros_zenoh.mapping.apply import apply_mapping
+    from reconros_zenoh.mapping.apply import apply_mapping, kept_streams
     from reconros_zenoh.mapping.project_graph import shared_slots
     from reconros_zenoh.project.loader import read_project
 
@@ -141,6 +141,7 @@ def _add_project(
     result["warnings"] += files.configuration.warnings
     if apply:
         before = files.unusable_mappings()
+        result["warnings"] += kept_streams(files.configuration, project.mapping, mappings)
         result["applied"] = apply_mapping(files.configuration, project.mapping, mappings)
         after = read_project(files.folder).unusable_mappings()
         result["warnings"] += [

@@ -61,6 +61,21 @@ def apply_mapping(
     return changes
 
 
+def kept_streams(
+    configuration: BuildConfiguration, node_mapping: ProjectMapping, mappings: Mapping[str, TopicMapping]
+) -> list[str]:
+    """Return a sentence for each topic in T_SW that the project file maps to hardware: it stays so."""
+    lines: dict[str, int] = {}
+    for end in topic_ends(configuration, node_mapping):
+        if end.resource.hardware_mapped and mappings[end.topic] is TopicMapping.SOFTWARE:
+            lines.setdefault(end.topic, end.resource.line)
+    return [
+        f"{configuration.path}:{line}: {topic} stays hardware-mapped, as --apply takes nothing back. Write "
+        "its ends without `hw` and remove its gateway, if it is to be software-mapped."
+        for topic, line in lines.items()
+    ]
+
+
 def _write_value(lines: list[str], option: Option, value: str) -> None:
     """Write `value` in place of the option's, and nothing else: comments behind it stay.
 

@@ -135,7 +135,22 @@ def test_a_project_is_mapped_and_written_once(tmp_path: Path) -> None:
     assert 'edges = rossub, node, sensor_msgs/Image, "/edges", hw' in output
     assert "[ROSGateway@image]" in path.read_text(encoding="utf-8")
     assert run_json(tmp_path, "--apply") == result | {"applied": []}
-    assert "has all of this already" in run(tmp_path, "--apply")
+    assert "nothing to add to build.cfg" in run(tmp_path, "--apply")
+
+
+def test_a_stream_that_is_one_no_more_is_told_of_and_stays(tmp_path: Path) -> None:
+    path = write(tmp_path)
+    run(tmp_path, "--apply")
+    second_reader = 'image = rossub, node, sensor_msgs/Image, "/image", hw\n'
+    text = path.read_text(encoding="utf-8")
+    assert second_reader in text
+    path.write_text(text.replace(second_reader, ""), encoding="utf-8")
+    result = run_json(tmp_path, "--apply")
+    assert result["t_sw"] == ["/image", "/vision/lane/found"]
+    assert result["applied"] == []
+    (warning,) = result["warnings"]
+    line = text[: text.index('sub = rossub, node, sensor_msgs/Image, "/image", hw')].count("\n") + 1
+    assert warning.startswith(f"{path}:{line}: /image stays hardware-mapped, as --apply takes nothing back.")
 
 
 def test_a_mapping_of_the_project(tmp_path: Path) -> None:
