@@ -101,6 +101,7 @@ def _application(verbs: list[str]) -> typer.Typer:
         pretty_exceptions_enable=False,
         rich_markup_mode=None,
         add_completion=False,
+        context_settings={"help_option_names": ["-h", "--help"]},
     )
     application.callback()(_options)
     for verb in verbs:

@@ -30,6 +30,13 @@ def test_the_list_of_commands_cuts_no_sentence(group: tuple[str, ...]) -> None:
     assert [line for line in lines if not line.endswith(".") or line.endswith("..")] == []
 
 
+@pytest.mark.parametrize("command", [[], ["board"], ["experiment"], ["experiment", "roundtrip"]])
+def test_h_is_short_for_help(command: list[str]) -> None:
+    done = CliRunner().invoke(application, [*command, "-h"])
+    assert done.exit_code == 0
+    assert done.stdout == CliRunner().invoke(application, [*command, "--help"]).stdout
+
+
 def test_it_says_its_versions() -> None:
     done = CliRunner().invoke(application, ["--version"])
     assert done.exit_code == 0
