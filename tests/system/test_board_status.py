@@ -52,6 +52,7 @@ def test_a_board_that_is_not_there_is_named(network: Network) -> None:
 def test_a_board_that_is_stopped_is_there_and_does_not_answer(network: Network) -> None:
     with Process("board", "--router", network.endpoint, "--name", "board1") as board:
         board.wait_for("serves")
+        assert run("status", "board1", "--router", network.endpoint).returncode == 0  # the router knows it
         os.kill(board.pid, signal.SIGSTOP)
         try:
             done = run("status", "board1", "--router", network.endpoint)
